@@ -34,8 +34,8 @@ setuptools.setup(
         "quad_nav.config": ["*.pyi"],
         "quad_nav.kernels": ["*.c"],
         "quad_nav.report": ["*.jinja"],
-        "quad_nav.tuning.report": ["*.jinja"],
-        "quad_nav.web": ["static/*"],
+        "quad_tune.report": ["*.jinja"],
+        "quad_web": ["static/*"],
     },
     data_files=[
         (f"share/quad/{folder}", list(map(str, paths)))

@@ -13,8 +13,8 @@ import tabulate
 from figures import JSON_HELP, LARGER, Figures
 
 import quad_nav
-from quad_nav.rl import FleetEnv
-from quad_nav.rl.fleet import Action
+from quad_rl import FleetEnv
+from quad_rl.fleet import Action
 
 BEAMS = 64
 PERIOD_S = 0.1
@@ -106,7 +106,7 @@ def main(file: Optional[Path]) -> None:
         "required",
         "reset\nms",
     ]
-    print(f"Environments of quad_nav.rl: {BEAMS} beams, {1 / PERIOD_S:.0f} Hz control, one core")
+    print(f"Environments of quad_rl: {BEAMS} beams, {1 / PERIOD_S:.0f} Hz control, one core")
     print(tabulate.tabulate(rows, header, disable_numparse=True, stralign="right"))
     figures.write(file)
 

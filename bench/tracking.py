@@ -25,10 +25,10 @@ from figures import JSON_HELP, Figures
 from numpy.typing import NDArray
 from tabulate import tabulate
 
-from quad_nav.barn.dynamic import flight_setup as dynabarn_setup
-from quad_nav.barn.dynamic import read_dynamic_setup
-from quad_nav.barn.setup import BarnOptions, read_barn_setup
-from quad_nav.barn.setup import flight_setup as barn_setup
+from quad_bench.barn.dynamic import flight_setup as dynabarn_setup
+from quad_bench.barn.dynamic import read_dynamic_setup
+from quad_bench.barn.setup import BarnOptions, read_barn_setup
+from quad_bench.barn.setup import flight_setup as barn_setup
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.offline.run import fly

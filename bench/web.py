@@ -42,8 +42,8 @@ from stream_client import open_stream  # noqa: E402
 from synthetic_actions import SyntheticActions  # noqa: E402
 from synthetic_fleet import SyntheticFleet  # noqa: E402
 
-from quad_nav.view.state import FleetState  # noqa: E402
-from quad_nav.web.stream import Stream  # noqa: E402
+from quad_web.view.state import FleetState  # noqa: E402
+from quad_web.stream import Stream  # noqa: E402
 
 LAYERS = ("trail", "plan", "local_plan", "scan", "global_costmap", "local_costmap")
 SETTLES_S = 2.0
@@ -193,8 +193,8 @@ def serve(server: str, robots: int, pipe: Any) -> None:
 
 
 def _serve_nicegui(fleet: SyntheticFleet, on_ready: Any) -> None:
-    from quad_nav.web.server import WebOptions
-    from quad_nav.web.server import serve as serve_page
+    from quad_web.server import WebOptions
+    from quad_web.server import serve as serve_page
 
     options = WebOptions(on_ready=lambda urls: on_ready(urls.steer))
     serve_page(fleet.state, SyntheticActions(fleet), options)

@@ -35,8 +35,8 @@ from websockets.sync.client import connect
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test" / "web"))
 
 from quad_nav.ros.common.packed_messages import STATES_TOPIC, StatesMessage, StatesReader
-from quad_nav.view.codec import decode
-from quad_nav.view.state import LAYERS
+from quad_web.view.codec import decode
+from quad_web.view.state import LAYERS
 
 READY_S = 60.0
 # A page acknowledges a message when it is drawn.

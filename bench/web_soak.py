@@ -28,7 +28,7 @@ from playwright.sync_api import Browser, CDPSession  # noqa: E402
 from serving import Served  # noqa: E402
 from stream_client import open_stream  # noqa: E402
 
-from quad_nav.view.state import LAYERS  # noqa: E402
+from quad_web.view.state import LAYERS  # noqa: E402
 
 WARM_UP_S = 120.0
 MOST_GROWTH = 0.05

@@ -15,12 +15,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Dict, List, Tuple
 
-from quad_nav.tuning.flight_cache import FlightCache
-from quad_nav.tuning.proposals import should_prune
-from quad_nav.tuning.score import mean_cost
-from quad_nav.tuning.search import best_first
-from quad_nav.tuning.space import Dimension, SearchSpace
-from quad_nav.tuning.study import open_study
+from quad_tune.flight_cache import FlightCache
+from quad_tune.proposals import should_prune
+from quad_tune.score import mean_cost
+from quad_tune.search import best_first
+from quad_tune.space import Dimension, SearchSpace
+from quad_tune.study import open_study
 
 IDENTITY = {"course": "synthetic"}
 SPACE = SearchSpace("synthetic", (Dimension("speed", 0.0, 1.0), Dimension("bad", 0.0, 10.0)))

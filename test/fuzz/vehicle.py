@@ -31,14 +31,14 @@ from vehicles.point_vehicle import PointVehicle
 from vehicles.virtual_flight import KINDS
 
 from quad_nav.geometry import Twist2D
-from quad_nav.vehicle import failsafes
-from quad_nav.vehicle.autopilots import AUTOPILOTS
-from quad_nav.vehicle.mavlink_adapter import MavlinkAdapter
-from quad_nav.vehicle.mavlink_link import MavlinkLink, UdpSocket, ardupilotmega
-from quad_nav.vehicle.orders import ON_GROUND, Permissions, State
-from quad_nav.vehicle.states import VehicleMachine
-from quad_nav.vehicle.telemetry import Limits
-from quad_nav.vehicle.vehicle_file import Lidar, Vehicle
+from quad_vehicles import failsafes
+from quad_vehicles.autopilots import AUTOPILOTS
+from quad_vehicles.mavlink_adapter import MavlinkAdapter
+from quad_vehicles.mavlink_link import MavlinkLink, UdpSocket, ardupilotmega
+from quad_vehicles.orders import ON_GROUND, Permissions, State
+from quad_vehicles.states import VehicleMachine
+from quad_vehicles.telemetry import Limits
+from quad_vehicles.vehicle_file import Lidar, Vehicle
 
 STEP_S, COMMAND_S = 0.01, 0.05
 STEPS, PER_STEP = 400, 20

@@ -16,7 +16,7 @@ from study_flights import mortal_tasks, searched, tune_setup  # noqa: E402
 
 from quad_nav.errors import InputError  # noqa: E402
 from quad_nav.offline.workers import LocalWorkers, RayWorkers, fly_all  # noqa: E402
-from quad_nav.tuning.flight_result import fly_task  # noqa: E402
+from quad_tune.flight_result import fly_task  # noqa: E402
 
 
 @pytest.fixture(scope="module")

@@ -24,9 +24,9 @@ sys.path.insert(1, str(Path(__file__).resolve().parents[1]))
 from vehicles.virtual_flight import Flight  # noqa: E402
 
 from quad_nav.geometry import Pose2D
-from quad_nav.ros.vehicle import fleet, maneuvers, node, topics
-from quad_nav.vehicle.orders import Output, State
-from quad_nav.vehicle.vehicle_file import Lidar, Vehicle
+from quad_vehicles.ros import fleet, maneuvers, node, topics
+from quad_vehicles.orders import Output, State
+from quad_vehicles.vehicle_file import Lidar, Vehicle
 
 DRIVER_TOPIC = "/rplidar/scan"
 START = Pose2D(1.5, 1.5, 0.0)

@@ -11,13 +11,13 @@ from typing import Any, Callable, Dict, Iterable, Iterator, List, Sequence, Tupl
 from quad_nav.errors import InputError
 from quad_nav.offline.workers import Workers
 from quad_nav.scenario.flight_setup import FlightSetup
-from quad_nav.tuning.courses import HELD_OUT_SEED, Case, Mission, MissionOptions
-from quad_nav.tuning.evaluation import Evaluation, StudyObserver
-from quad_nav.tuning.flight_result import FlightResult, FlightTask
-from quad_nav.tuning.search import SearchOptions, search
-from quad_nav.tuning.space import Assignments, Dimension, SearchSpace
-from quad_nav.tuning.study import open_study
-from quad_nav.tuning.tune import TuneOptions, TuneSetup, read_tune_setup, start_values
+from quad_tune.courses import HELD_OUT_SEED, Case, Mission, MissionOptions
+from quad_tune.evaluation import Evaluation, StudyObserver
+from quad_tune.flight_result import FlightResult, FlightTask
+from quad_tune.search import SearchOptions, search
+from quad_tune.space import Assignments, Dimension, SearchSpace
+from quad_tune.study import open_study
+from quad_tune.tune import TuneOptions, TuneSetup, read_tune_setup, start_values
 
 SCENE = """\
 name: small
@@ -210,5 +210,5 @@ def without_flying(
 ) -> None:
     """Let a command fly on paper."""
     monkeypatch.setattr(f"quad_nav.cli.{module}.workers_of", lambda *_: PaperWorkers(fly))
-    monkeypatch.setattr("quad_nav.cli.flights_bar.warm_up", lambda _: None)
-    monkeypatch.setattr("quad_nav.cli.flights_bar.simulate", lambda: None)
+    monkeypatch.setattr("quad_tune.cli.flights_bar.warm_up", lambda _: None)
+    monkeypatch.setattr("quad_tune.cli.flights_bar.simulate", lambda: None)

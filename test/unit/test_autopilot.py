@@ -10,8 +10,8 @@ from quad_nav.scenario.simulator_setup import read_setup
 from quad_nav.sim.flight import AIRFRAMES, Airframe, AutopilotResponse, airframe_name
 from quad_nav.sim.scene import Scene, Walls
 from quad_nav.sim.simulation import STEPS_PER_S, Simulation, SimulationParams
-from quad_nav.vehicle.autopilots import ARDUPILOT
-from quad_nav.vehicle.setpoints import PERIOD_S
+from quad_vehicles.autopilots import ARDUPILOT
+from quad_vehicles.setpoints import PERIOD_S
 
 ROOM = Scene("room", 60.0, 60.0, 1.0, Walls(), (), (Pose2D(30.0, 30.0, 0.0),))
 NARROW = Scene("narrow", 60.0, 60.0, 1.0, Walls(), (), (Pose2D(59.0, 30.0, 0.0),))

@@ -13,20 +13,20 @@ import pytest
 from click.testing import CliRunner
 
 from quad_nav import config
-from quad_nav.barn.protocol import Outcome, Run, metric
-from quad_nav.barn.results import Results, differences
-from quad_nav.barn.runs import fly_all, fly_world, judge
-from quad_nav.barn.setup import BarnOptions, flight_setup, read_barn_setup
-from quad_nav.barn.statistics import barn_statistics
-from quad_nav.barn.worlds import BarnWorld, load_worlds
-from quad_nav.cli.barn import barn
+from quad_bench.barn.protocol import Outcome, Run, metric
+from quad_bench.barn.results import Results, differences
+from quad_bench.barn.runs import fly_all, fly_world, judge
+from quad_bench.barn.setup import BarnOptions, flight_setup, read_barn_setup
+from quad_bench.barn.statistics import barn_statistics
+from quad_bench.barn.worlds import BarnWorld, load_worlds
+from quad_bench.cli.barn import barn
 from quad_nav.errors import InputError
 from quad_nav.mission.flight_log import Leg
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.summary import MissionSummary, RobotSummary
 from quad_nav.offline.flight import StopAtContact
 from quad_nav.offline.run import fly
-from quad_nav.results import wilson_interval
+from quad_nav.report.results import wilson_interval
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Cylinder
 
@@ -386,7 +386,7 @@ def test_bad_input_ends_with_2_and_ctrl_c_with_130_and_what_was_flown(tmp_path, 
         yield RUN
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("quad_nav.cli.barn_benchmarks.fly_all", two_flights)
+    monkeypatch.setattr("quad_bench.cli.barn_benchmarks.fly_all", two_flights)
     cut = CliRunner().invoke(barn, ["--worlds", str(path)])
     assert cut.exit_code == 130
     assert "Interrupted after 1 of 2 flights." in cut.output

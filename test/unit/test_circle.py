@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from quad_nav.circle.orca import Orca, OrcaParams
-from quad_nav.circle.results import (
+from quad_bench.circle.orca import Orca, OrcaParams
+from quad_bench.circle.results import (
     CircleResults,
     circle_statistics,
     in_order,
@@ -18,8 +18,8 @@ from quad_nav.circle.results import (
     to_csv,
     to_json,
 )
-from quad_nav.circle.runs import CircleRun, Track, fly_orca, fly_orca_points, fly_quad
-from quad_nav.circle.setup import (
+from quad_bench.circle.runs import CircleRun, Track, fly_orca, fly_orca_points, fly_quad
+from quad_bench.circle.setup import (
     METHODS,
     CircleOptions,
     circle_starts,
@@ -28,7 +28,7 @@ from quad_nav.circle.setup import (
 )
 from quad_nav.cli import circle as command
 from quad_nav.errors import InputError
-from quad_nav.report.circle_picture import PathsPanel, paths_figure
+from quad_bench.circle.picture import PathsPanel, paths_figure
 from quad_nav.sim.scene import BODY_RADIUS_M
 
 needs_orca = pytest.mark.skipif(

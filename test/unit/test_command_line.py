@@ -14,7 +14,7 @@ from quad_nav.cli import COMMANDS, main
 from quad_nav.cli.fly import LIDAR_CASTERS, MAX_DRIFT
 from quad_nav.files.shipped import shipped
 from quad_nav.sim import odometry, simulation
-from quad_nav.tuning.courses import Mission, MissionCourse, MissionOptions
+from quad_tune.courses import Mission, MissionCourse, MissionOptions
 
 SOURCES = Path(__file__).resolve().parents[2] / "src"
 ENGINE = ("numpy", "numba", "pybullet", "scipy", "matplotlib", "joblib", "optuna", "rich.progress")

@@ -58,8 +58,8 @@ if __name__ == "__main__":
 """
 PAGE = """
 from quad_nav.errors import InputError
-from quad_nav.web import process
-from quad_nav.web.server import WebOptions
+from quad_web import process
+from quad_web.server import WebOptions
 
 process.require_nicegui = lambda: None
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from quad_nav.barn.dynamic import (
+from quad_bench.barn.dynamic import (
     PHASE_S,
     DynamicRun,
     ProtocolClock,
@@ -21,11 +21,11 @@ from quad_nav.barn.dynamic import (
     phase_of,
     read_dynamic_setup,
 )
-from quad_nav.barn.dynamic_results import DynamicResults, text, to_csv, to_json
-from quad_nav.barn.dynamic_worlds import load_dynamic_worlds
-from quad_nav.barn.protocol import Outcome
-from quad_nav.barn.setup import BarnOptions
-from quad_nav.cli.dynabarn import dynabarn
+from quad_bench.barn.dynamic_results import DynamicResults, text, to_csv, to_json
+from quad_bench.barn.dynamic_worlds import load_dynamic_worlds
+from quad_bench.barn.protocol import Outcome
+from quad_bench.barn.setup import BarnOptions
+from quad_bench.cli.dynabarn import dynabarn
 from quad_nav.errors import InputError
 from quad_nav.sim.movers import Movers
 

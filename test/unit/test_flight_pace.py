@@ -6,10 +6,10 @@ import pytest
 from click.testing import CliRunner
 from study_flights import FLOWN, tune_setup, without_flying, write_mission
 
-from quad_nav.cli.flights_bar import FlightsBar
+from quad_tune.cli.flights_bar import FlightsBar
 from quad_nav.cli.progress import FlightPace, duration_text, processes_text
-from quad_nav.cli.sweep import sweep
-from quad_nav.tuning.evaluation import StudyObserver
+from quad_tune.cli.sweep import sweep
+from quad_tune.evaluation import StudyObserver
 
 
 class Clock:
@@ -95,7 +95,7 @@ class Planned(StudyObserver):
 def test_the_plan_of_a_study_ends_at_its_flights(tmp_path):
     from study_flights import PaperWorkers
 
-    from quad_nav.tuning.tune import run_tune
+    from quad_tune.tune import run_tune
 
     setup = tune_setup(tmp_path, tmp_path / "out", candidates=5)
     observer = Planned()

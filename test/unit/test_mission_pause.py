@@ -9,7 +9,7 @@ rospy = pytest.importorskip("rospy")
 from ros.fake_ros import FakeRos  # noqa: E402
 from std_srvs.srv import TriggerResponse  # noqa: E402
 
-from quad_nav.ros.vehicle.topics import MissionPause  # noqa: E402
+from quad_vehicles.ros.topics import MissionPause  # noqa: E402
 
 STOP, RESUME = "/mission/quad0/stop", "/mission/quad0/resume"
 STOPPED = "/mission/quad0/stopped"

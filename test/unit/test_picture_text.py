@@ -12,8 +12,8 @@ from optuna.trial import TrialState, create_trial
 
 from quad_nav.report.flight_page import flight_page
 from quad_nav.report.style import label_log, png, styled
-from quad_nav.tuning.report.search_pictures import history_picture, slice_picture
-from quad_nav.tuning.space import Dimension, SearchSpace
+from quad_tune.report.search_pictures import history_picture, slice_picture
+from quad_tune.space import Dimension, SearchSpace
 
 SPACE = SearchSpace(
     "by hand",

@@ -11,11 +11,11 @@ from hand_made_recording import LAST_S, SUFFIXES, write_flight, x_at
 
 from quad_nav.cli import main
 from quad_nav.recording import replay as replay_module
-from quad_nav.recording.recorded_flight import RecordedFlight
-from quad_nav.recording.replay import FASTEST, OpenedReplay, Replay
+from quad_web.replay.recorded_flight import RecordedFlight
+from quad_web.replay.replay import FASTEST, OpenedReplay, Replay
 from quad_nav.sim.scene import BODY_RADIUS_M
-from quad_nav.view.actions import Answer
-from quad_nav.view.state import LAYERS, FleetState, Wanted
+from quad_web.view.actions import Answer
+from quad_web.view.state import LAYERS, FleetState, Wanted
 
 
 @pytest.fixture(scope="module", params=SUFFIXES)

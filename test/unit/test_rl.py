@@ -13,8 +13,8 @@ from pettingzoo.test import parallel_api_test, parallel_seed_test
 import quad_nav
 from quad_nav.errors import InputError
 from quad_nav.recording.trace import TraceObserver
-from quad_nav.rl import FleetEnv, QuadEnv, default_reward
-from quad_nav.rl.task import Progress
+from quad_rl import FleetEnv, QuadEnv, default_reward
+from quad_rl.task import Progress
 
 ROOT = Path(__file__).resolve().parents[2]
 NEAR = [[2.6, 1.8]]  # 1.1 m ahead of the start (1.5, 1.5) of the arena

@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 from study_flights import SYNTHETIC_SPACE, write_mission
 from test_tuning_search import IDENTITY, run
 
-from quad_nav.cli.sweep import sweep
+from quad_tune.cli.sweep import sweep
 from quad_nav.errors import InputError
-from quad_nav.tuning.flight_cache import FlightCache
-from quad_nav.tuning.study import open_study
+from quad_tune.flight_cache import FlightCache
+from quad_tune.study import open_study
 
 FUZZ = Path(__file__).parents[1] / "fuzz"
 sys.path.insert(0, str(FUZZ))
@@ -258,7 +258,7 @@ def test_an_empty_file_is_a_new_study(tmp_path, whole):
 
 
 def test_a_file_that_another_program_locks_is_refused(study, monkeypatch):
-    monkeypatch.setattr("quad_nav.tuning.study_database.LOCK_TIMEOUT_S", 0.0)
+    monkeypatch.setattr("quad_tune.study_database.LOCK_TIMEOUT_S", 0.0)
     with closing(sqlite3.connect(study, isolation_level=None)) as other:
         other.execute("BEGIN EXCLUSIVE")
         assert "locked; expected that no other program" in refused(

@@ -17,14 +17,14 @@ from study_flights import (
     write_mission,
 )
 
-from quad_nav.cli.sweep import sweep
-from quad_nav.cli.tune import tune
+from quad_tune.cli.sweep import sweep
+from quad_tune.cli.tune import tune
 from quad_nav.errors import InputError
-from quad_nav.tuning.evaluation import StudyObserver
-from quad_nav.tuning.flight_cache import FlightCache
-from quad_nav.tuning.study import open_study
-from quad_nav.tuning.study_database import NotStored
-from quad_nav.tuning.tune import StudyStopped, run_tune
+from quad_tune.evaluation import StudyObserver
+from quad_tune.flight_cache import FlightCache
+from quad_tune.study import open_study
+from quad_tune.study_database import NotStored
+from quad_tune.tune import StudyStopped, run_tune
 
 
 def fill_disk(monkeypatch, pages):
@@ -126,7 +126,7 @@ def test_a_sweep_flies_on_without_storing(tmp_path, monkeypatch):
 
 
 def test_a_flight_that_cannot_be_stored_stays_in_memory(tmp_path, monkeypatch):
-    monkeypatch.setattr("quad_nav.tuning.flight_cache._TIMEOUT_S", 0.0)
+    monkeypatch.setattr("quad_tune.flight_cache._TIMEOUT_S", 0.0)
     cache, key = FlightCache(tmp_path / "f.db"), ("{}", "m", 0)
     with closing(sqlite3.connect(tmp_path / "f.db", isolation_level=None)) as other:
         other.execute("BEGIN EXCLUSIVE")

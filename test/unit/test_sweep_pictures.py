@@ -10,8 +10,8 @@ import plotly.graph_objects
 import pytest
 
 from quad_nav.report.style import png, styled
-from quad_nav.tuning.flight_result import FlightResult
-from quad_nav.tuning.report.sweep_measures import (
+from quad_tune.flight_result import FlightResult
+from quad_tune.report.sweep_measures import (
     MEASURES,
     Estimate,
     axis_note,
@@ -19,9 +19,9 @@ from quad_nav.tuning.report.sweep_measures import (
     is_numeric,
     starts_at_zero,
 )
-from quad_nav.tuning.report.sweep_page import sweep_picture
-from quad_nav.tuning.report.sweep_plot import sweep_plot
-from quad_nav.tuning.sweep import SweepRow
+from quad_tune.report.sweep_page import sweep_picture
+from quad_tune.report.sweep_plot import sweep_plot
+from quad_tune.sweep import SweepRow
 
 pytestmark = pytest.mark.filterwarnings("error")
 

@@ -23,7 +23,7 @@ from quad_nav.mission.summary import MissionSummary, RobotSummary
 from quad_nav.mission.summary_table import table
 from quad_nav.recording.bag_info import checked_flight
 from quad_nav.sim.contacts import Contact
-from quad_nav.tuning.flight_cache import FlightCache
+from quad_tune.flight_cache import FlightCache
 
 EVIL = "\x1b]0;owned\x07\x1b[2J\x9b31m\r\x08\x7f\u202ecod\u2066\u200e\nforged: all goals reached"
 NAME = EVIL.replace("/", "")

@@ -9,10 +9,10 @@ import plotly.graph_objects
 import pytest
 from study_flights import FLOWN, PaperWorkers, tune_setup
 
-from quad_nav.tuning.evaluation import StudyObserver
-from quad_nav.tuning.report.tune_plots import held_out_plot, history_plot, pareto_plot
-from quad_nav.tuning.statistics import flight_statistics
-from quad_nav.tuning.tune import run_tune
+from quad_tune.evaluation import StudyObserver
+from quad_tune.report.tune_plots import held_out_plot, history_plot, pareto_plot
+from quad_tune.statistics import flight_statistics
+from quad_tune.tune import run_tune
 
 
 def flown(task):

@@ -10,9 +10,9 @@ import pytest
 
 from quad_nav import config
 from quad_nav.config.files import set_value
-from quad_nav.tuning.parameter_files import Change, FilesDiffer, base_value, write_parameters
-from quad_nav.tuning.space import costmap_paths
-from quad_nav.tuning.yaml_edit import inserted, replaced, value_text
+from quad_tune.parameter_files import Change, FilesDiffer, base_value, write_parameters
+from quad_tune.space import costmap_paths
+from quad_tune.yaml_edit import inserted, replaced, value_text
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = """\

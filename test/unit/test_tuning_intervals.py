@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from study_flights import FLOWN, PaperWorkers, tune_setup
 
-from quad_nav.tuning.evaluation import StudyObserver
-from quad_nav.tuning.flight_result import FlightTask
-from quad_nav.tuning.statistics import (
+from quad_tune.evaluation import StudyObserver
+from quad_tune.flight_result import FlightTask
+from quad_tune.statistics import (
     MIN_PAIRS,
     compare,
     mean_interval,
     paired_difference,
 )
-from quad_nav.tuning.study_text import comparison_text, held_out_lines, text, verdict
-from quad_nav.tuning.tune import run_tune
+from quad_tune.study_text import comparison_text, held_out_lines, text, verdict
+from quad_tune.tune import run_tune
 
 
 def test_equal_pairs_differ_by_nothing():

@@ -11,16 +11,16 @@ from click.testing import CliRunner
 from study_flights import FLOWN, PaperWorkers, tune_setup, without_flying, write_mission
 
 from quad_nav import config
-from quad_nav.cli.tune import tune
+from quad_tune.cli.tune import tune
 from quad_nav.config.spec import Table
 from quad_nav.config.tables import costmap, dwa_planner, recoveries, trajectory_planner
 from quad_nav.errors import InputError
-from quad_nav.tuning.evaluation import StudyObserver
-from quad_nav.tuning.parameter_files import write_parameters
-from quad_nav.tuning.robot_limits import hold_limits, is_limit, is_protected
-from quad_nav.tuning.space import Dimension, SearchSpace, load_space
-from quad_nav.tuning.study_text import changes
-from quad_nav.tuning.tune import run_tune
+from quad_tune.evaluation import StudyObserver
+from quad_tune.parameter_files import write_parameters
+from quad_tune.robot_limits import hold_limits, is_limit, is_protected
+from quad_tune.space import Dimension, SearchSpace, load_space
+from quad_tune.study_text import changes
+from quad_tune.tune import run_tune
 
 ROOT = Path(__file__).resolve().parents[2]
 SPEEDS = ("m/s", "rad/s", "m/s^2", "rad/s^2")
@@ -229,7 +229,7 @@ def test_spaces_that_are_refused(tmp_path, space, more, words):
 
 def test_the_start_names_the_limits_that_stay(tmp_path, monkeypatch):
     without_flying(monkeypatch, "tune_study")
-    monkeypatch.setattr("quad_nav.cli.tune_study.write_result", lambda *_: ())
+    monkeypatch.setattr("quad_tune.cli.tune_study.write_result", lambda *_: ())
     space = "TrajectoryPlannerROS/max_vel_x: {range: [0.2, 1]}\nplanner_frequency: {range: [1, 2]}"
     sizes = ["--candidates", "2", "--flights", "1", "--held-out", "1", "--final-flights", "1"]
     done = CliRunner().invoke(tune, command(tmp_path, space, *sizes))

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 from study_flights import FLOWN
 
-from quad_nav.tuning.flight_result import FlightResult
-from quad_nav.tuning.score import TERMS, cost, mean_cost
-from quad_nav.tuning.statistics import flight_statistics
+from quad_tune.flight_result import FlightResult
+from quad_tune.score import TERMS, cost, mean_cost
+from quad_tune.statistics import flight_statistics
 
 
 @pytest.mark.parametrize(

@@ -22,15 +22,15 @@ from study_flights import (
 )
 
 from quad_nav.errors import InputError
-from quad_nav.tuning.evaluation import Evaluation, StudyObserver
-from quad_nav.tuning.flight_cache import FlightCache
-from quad_nav.tuning.flight_result import FlightResult
-from quad_nav.tuning.proposals import propose, should_prune
-from quad_nav.tuning.refinement import refine
-from quad_nav.tuning.report.search_pictures import importances
-from quad_nav.tuning.search import SearchOptions, best_first, rounds, search
-from quad_nav.tuning.study import json_differences, open_study
-from quad_nav.tuning.study_text import gain_text
+from quad_tune.evaluation import Evaluation, StudyObserver
+from quad_tune.flight_cache import FlightCache
+from quad_tune.flight_result import FlightResult
+from quad_tune.proposals import propose, should_prune
+from quad_tune.refinement import refine
+from quad_tune.report.search_pictures import importances
+from quad_tune.search import SearchOptions, best_first, rounds, search
+from quad_tune.study import json_differences, open_study
+from quad_tune.study_text import gain_text
 
 HERE = Path(__file__).resolve().parent
 OPTIONS = SearchOptions(candidates=32, flights=4, generation=8, seed=3)

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from quad_nav.errors import InputError
-from quad_nav.tuning.space import Dimension, SearchSpace, load_space
-from quad_nav.tuning.study_input import parameter_faults
+from quad_tune.space import Dimension, SearchSpace, load_space
+from quad_tune.study_input import parameter_faults
 
 ROOT = Path(__file__).resolve().parents[2]
 TURN = Dimension("P/max_turn", 0.5, 1.5, follow=(("P/min_turn", -1.0), ("*_costmap/x", 2.0)))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from quad_nav.barn.worlds import load_worlds
+from quad_bench.barn.worlds import load_worlds
 from quad_nav.config.files import load_files
 from quad_nav.errors import MAX_PROBLEMS, InputError
 from quad_nav.files.user_files import open_file, read_bytes, read_text, referenced_file

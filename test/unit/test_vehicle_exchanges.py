@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from quad_nav.vehicle.exchanges import ClockSync, MessageRates, Parameters
-from quad_nav.vehicle.frames import scan_from_obstacle_distance
+from quad_vehicles.exchanges import ClockSync, MessageRates, Parameters
+from quad_vehicles.frames import scan_from_obstacle_distance
 
 
 def test_rates_are_asked_for_again_until_they_arrive():

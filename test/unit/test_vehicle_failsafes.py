@@ -8,9 +8,9 @@ import pytest
 from vehicles.point_vehicle import ARDUPILOT, PX4
 from vehicles.virtual_flight import StandInFlight
 
-from quad_nav.vehicle import failsafes
-from quad_nav.vehicle.orders import State
-from quad_nav.vehicle.vehicle_file import Vehicle
+from quad_vehicles import failsafes
+from quad_vehicles.orders import State
+from quad_vehicles.vehicle_file import Vehicle
 
 VEHICLE = Vehicle(3, "mavlink", bridge_system=237)
 SETS = Vehicle(3, "mavlink", bridge_system=237, sets_failsafes=True)

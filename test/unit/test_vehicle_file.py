@@ -10,8 +10,8 @@ import yaml
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
-from quad_nav.vehicle.addresses import address_problem, share
-from quad_nav.vehicle.vehicle_file import OUR_SYSTEM, load_vehicles, vehicles_from_document
+from quad_vehicles.addresses import address_problem, share
+from quad_vehicles.vehicle_file import OUR_SYSTEM, load_vehicles, vehicles_from_document
 
 ROOT = Path(__file__).resolve().parents[2]
 GOOD = """

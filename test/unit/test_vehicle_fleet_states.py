@@ -15,9 +15,9 @@ from std_srvs.srv import TriggerRequest  # noqa: E402
 
 from quad_nav.errors import InputError  # noqa: E402
 from quad_nav.geometry import Pose2D  # noqa: E402
-from quad_nav.ros.vehicle import fleet  # noqa: E402
-from quad_nav.ros.vehicle.fleet import VehicleFleet, read_setup  # noqa: E402
-from quad_nav.vehicle.vehicle_file import Vehicle  # noqa: E402
+from quad_vehicles.ros import fleet  # noqa: E402
+from quad_vehicles.ros.fleet import VehicleFleet, read_setup  # noqa: E402
+from quad_vehicles.vehicle_file import Vehicle  # noqa: E402
 
 ARENA = Path(__file__).resolve().parents[2] / "scenes" / "arena.yaml"
 

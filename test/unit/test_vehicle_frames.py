@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quad_nav.geometry import quaternion_from_euler, rotate, yaw_from_quaternion
-from quad_nav.vehicle import frames
-from quad_nav.vehicle.setpoints import led, limited, setpoint_fields
-from quad_nav.vehicle.telemetry import Limits, Velocity
+from quad_vehicles import frames
+from quad_vehicles.setpoints import led, limited, setpoint_fields
+from quad_vehicles.telemetry import Limits, Velocity
 
 ANGLES = st.floats(-math.pi, math.pi)
 NUMBERS = st.floats(-1e6, 1e6)

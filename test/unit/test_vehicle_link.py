@@ -8,12 +8,12 @@ import time
 import pytest
 
 from quad_nav.errors import InputError
-from quad_nav.vehicle.autopilots import AUTOPILOTS
-from quad_nav.vehicle.mavlink_link import MavlinkLink, mavutil
-from quad_nav.vehicle.orders import Permissions
-from quad_nav.vehicle.states import VehicleMachine
-from quad_nav.vehicle.telemetry import Limits
-from quad_nav.vehicle.vehicle_file import OUR_SYSTEM, Vehicle
+from quad_vehicles.autopilots import AUTOPILOTS
+from quad_vehicles.mavlink_link import MavlinkLink, mavutil
+from quad_vehicles.orders import Permissions
+from quad_vehicles.states import VehicleMachine
+from quad_vehicles.telemetry import Limits
+from quad_vehicles.vehicle_file import OUR_SYSTEM, Vehicle
 
 PATIENCE_S = 20.0
 

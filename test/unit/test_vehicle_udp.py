@@ -10,12 +10,12 @@ import time
 import pytest
 
 from quad_nav.errors import InputError
-from quad_nav.vehicle.autopilots import AUTOPILOTS
-from quad_nav.vehicle.mavlink_link import MavlinkLink, ardupilotmega
-from quad_nav.vehicle.orders import Permissions
-from quad_nav.vehicle.states import VehicleMachine
-from quad_nav.vehicle.telemetry import Limits
-from quad_nav.vehicle.vehicle_file import Vehicle
+from quad_vehicles.autopilots import AUTOPILOTS
+from quad_vehicles.mavlink_link import MavlinkLink, ardupilotmega
+from quad_vehicles.orders import Permissions
+from quad_vehicles.states import VehicleMachine
+from quad_vehicles.telemetry import Limits
+from quad_vehicles.vehicle_file import Vehicle
 
 PATIENCE_S = 20.0
 ENCODER = ardupilotmega.MAVLink(None, 1, 1)

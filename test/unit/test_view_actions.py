@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from quad_nav.geometry import Pose2D
-from quad_nav.view.actions import Actions, Answer, GoalFileView, ParameterView, WatchOnly
+from quad_web.view.actions import Actions, Answer, GoalFileView, ParameterView, WatchOnly
 
 PARAMETERS = [ParameterView("", "planner_frequency", "double", 1.0, 1.0)]
 FILES = [GoalFileView(0, "goals.json", "v1", [(1.0, 2.0, None)])]

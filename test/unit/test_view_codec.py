@@ -9,9 +9,9 @@ import struct
 import numpy as np
 import pytest
 
-from quad_nav.view import codec
-from quad_nav.view.codec import decode, encode
-from quad_nav.view.state import Item
+from quad_web.view import codec
+from quad_web.view.codec import decode, encode
+from quad_web.view.state import Item
 
 ARRAYS = {
     "pose": np.arange(6, dtype=np.float32).reshape(2, 3),

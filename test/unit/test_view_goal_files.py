@@ -8,8 +8,8 @@ import math
 import pytest
 
 from quad_nav.mission.goal_file import load_goals
-from quad_nav.view.actions import GoalChange
-from quad_nav.view.goal_files import GoalFiles
+from quad_web.view.actions import GoalChange
+from quad_web.view.goal_files import GoalFiles
 
 TEXT = '{\n  "retries": 2,\n  "goals": [\n    [1.0, 5.0],\n    [7.0, 3.50, 1.57]\n  ]\n}\n'
 
@@ -81,7 +81,7 @@ def test_a_full_disk_is_an_answer(files, monkeypatch):
     def full(path, content):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("quad_nav.view.goal_files.write_bytes", full)
+    monkeypatch.setattr("quad_web.view.goal_files.write_bytes", full)
     answer = files.save_goals(3, *unchanged(files))
     text = f"not saved: {files.files[3]}: cannot be written: No space left on device"
     assert (answer.ok, answer.text) == (False, text)

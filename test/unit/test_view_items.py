@@ -22,8 +22,8 @@ from quad_nav.peers.right_of_way import Yield, YieldDecision
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.motion import Motion, Walkers
 from quad_nav.sim.scene import Box, Cylinder, MovingObstacle, Scene, Sphere, Walls
-from quad_nav.view.cells import buffered_cell, cell_items
-from quad_nav.view.items import (
+from quad_web.view.cells import buffered_cell, cell_items
+from quad_web.view.items import (
     TRAIL_POINTS,
     UNKNOWN_BODY,
     ObstacleItems,
@@ -39,7 +39,7 @@ from quad_nav.view.items import (
     scene_item,
     track_item,
 )
-from quad_nav.view.rows import (
+from quad_web.view.rows import (
     contacts_item,
     flight_item,
     gaps_m,

@@ -7,8 +7,8 @@ import threading
 import numpy as np
 import pytest
 
-from quad_nav.view import state as view_state
-from quad_nav.view.state import FleetState, Item, Wanted, robots_by_layer
+from quad_web.view import state as view_state
+from quad_web.view.state import FleetState, Item, Wanted, robots_by_layer
 
 NOTHING = {}
 

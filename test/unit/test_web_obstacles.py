@@ -12,8 +12,8 @@ rospy = pytest.importorskip("rospy")
 
 from quad_nav.geometry import Pose3D, quaternion_from_yaw  # noqa: E402
 from quad_nav.ros.common.conversions import marker_array, replacing_markers  # noqa: E402
-from quad_nav.ros.web.layers import TrackIntake  # noqa: E402
-from quad_nav.ros.web.obstacles import Obstacles  # noqa: E402
+from quad_web.ros.layers import TrackIntake  # noqa: E402
+from quad_web.ros.obstacles import Obstacles  # noqa: E402
 from quad_nav.sim.motion import Motion, Walkers  # noqa: E402
 from quad_nav.sim.movers import Movers  # noqa: E402
 from quad_nav.sim.scene import Box, MovingObstacle, Scene, Walls  # noqa: E402

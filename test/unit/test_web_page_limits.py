@@ -7,8 +7,8 @@ import logging
 
 import pytest
 
-from quad_nav.web import page_limits
-from quad_nav.web.page_limits import MAX_KINDS, Complaints
+from quad_web import page_limits
+from quad_web.page_limits import MAX_KINDS, Complaints
 
 
 @pytest.fixture

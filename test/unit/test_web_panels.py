@@ -9,13 +9,13 @@ import pytest
 from page_without_browser import PARAMETERS, fleet
 
 from quad_nav.geometry import Pose2D
-from quad_nav.view.actions import GoalChange, GoalFileView, ParameterView
-from quad_nav.web import log_panels as logs
-from quad_nav.web import robot_panels as robots
-from quad_nav.web.flight_bar import RATES, clock_text, rate_step, rate_text
-from quad_nav.web.goal_draft import GoalDraft
-from quad_nav.web.live_table import LiveTable, column
-from quad_nav.web.parameter_panel import (
+from quad_web.view.actions import GoalChange, GoalFileView, ParameterView
+from quad_web import log_panels as logs
+from quad_web import robot_panels as robots
+from quad_web.flight_bar import RATES, clock_text, rate_step, rate_text
+from quad_web.goal_draft import GoalDraft
+from quad_web.live_table import LiveTable, column
+from quad_web.parameter_panel import (
     by_namespace,
     is_changed,
     is_found,

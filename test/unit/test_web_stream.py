@@ -8,10 +8,10 @@ import time
 
 import pytest
 
-from quad_nav.view.codec import decode
-from quad_nav.view.state import FleetState, Item, Wanted
-from quad_nav.web import stream as web_stream
-from quad_nav.web.stream import Stream
+from quad_web.view.codec import decode
+from quad_web.view.state import FleetState, Item, Wanted
+from quad_web import stream as web_stream
+from quad_web.stream import Stream
 
 PATIENCE_S = 10.0
 

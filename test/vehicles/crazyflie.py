@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from quad_nav.sim.flight import Airframe, AutopilotResponse
-from quad_nav.vehicle.crazyflie_adapter import BLOCKS
+from quad_vehicles.crazyflie_adapter import BLOCKS
 
 AIRFRAME = Airframe(
     response=AutopilotResponse(

@@ -11,11 +11,11 @@ from vehicles.virtual_flight import STARTS
 
 from quad_nav.geometry import Twist2D
 from quad_nav.sim.simulation import STEP_S
-from quad_nav.vehicle.crazyflie_adapter import TRAITS, CrazyflieAdapter
-from quad_nav.vehicle.orders import Permissions, State
-from quad_nav.vehicle.states import VehicleMachine
-from quad_nav.vehicle.telemetry import Limits
-from quad_nav.vehicle.vehicle_file import Lidar, Vehicle
+from quad_vehicles.crazyflie_adapter import TRAITS, CrazyflieAdapter
+from quad_vehicles.orders import Permissions, State
+from quad_vehicles.states import VehicleMachine
+from quad_vehicles.telemetry import Limits
+from quad_vehicles.vehicle_file import Lidar, Vehicle
 
 MAY_ARM, AHEAD = Permissions(may_arm=True), Twist2D(0.3, 0.0, 0.0)
 STEPS = 2  # of the simulation, between two ticks of the bridge

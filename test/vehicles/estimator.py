@@ -6,7 +6,7 @@ import math
 import random
 from dataclasses import dataclass
 
-from quad_nav.vehicle.frames import ned_from_frd
+from quad_vehicles.frames import ned_from_frd
 
 GROUND_OFFSET_M = -0.035
 """Height that the recorded autopilot reports while it stands on the ground."""

@@ -11,7 +11,7 @@ import math
 from collections import deque
 from types import SimpleNamespace
 
-from quad_nav.vehicle.vehicle_file import OUR_SYSTEM
+from quad_vehicles.vehicle_file import OUR_SYSTEM
 
 ARDUPILOT = {
     "autopilot": 3,

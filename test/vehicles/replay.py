@@ -24,12 +24,12 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from quad_nav.geometry import Twist2D
-from quad_nav.vehicle.autopilots import AUTOPILOTS
-from quad_nav.vehicle.mavlink_adapter import MavlinkAdapter
-from quad_nav.vehicle.orders import Permissions, State
-from quad_nav.vehicle.states import VehicleMachine
-from quad_nav.vehicle.telemetry import Limits
-from quad_nav.vehicle.vehicle_file import OUR_SYSTEM, Vehicle
+from quad_vehicles.autopilots import AUTOPILOTS
+from quad_vehicles.mavlink_adapter import MavlinkAdapter
+from quad_vehicles.orders import Permissions, State
+from quad_vehicles.states import VehicleMachine
+from quad_vehicles.telemetry import Limits
+from quad_vehicles.vehicle_file import OUR_SYSTEM, Vehicle
 
 TICK_S, COMMAND_S = 0.01, 0.05
 GUIDED = 4

@@ -30,7 +30,7 @@ from vehicles.virtual_flight import AIRFRAMES, STAND_INS
 
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.scene_file import load_scene
-from quad_nav.vehicle.vehicle_file import OUR_SYSTEM
+from quad_vehicles.vehicle_file import OUR_SYSTEM
 
 STEP_S = 1.0 / 120.0
 BOOT_S = 60.0

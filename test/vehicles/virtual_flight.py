@@ -16,12 +16,12 @@ from vehicles.stand_in import advance
 
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.sim.simulation import STEP_S as STEP
-from quad_nav.vehicle.autopilots import AUTOPILOTS
-from quad_nav.vehicle.mavlink_adapter import MavlinkAdapter
-from quad_nav.vehicle.orders import Permissions, State
-from quad_nav.vehicle.states import VehicleMachine
-from quad_nav.vehicle.telemetry import Limits
-from quad_nav.vehicle.vehicle_file import OUR_SYSTEM, Vehicle
+from quad_vehicles.autopilots import AUTOPILOTS
+from quad_vehicles.mavlink_adapter import MavlinkAdapter
+from quad_vehicles.orders import Permissions, State
+from quad_vehicles.states import VehicleMachine
+from quad_vehicles.telemetry import Limits
+from quad_vehicles.vehicle_file import OUR_SYSTEM, Vehicle
 
 STEP_S = 0.01
 MAY_ARM, AHEAD = Permissions(may_arm=True), Twist2D(0.5, 0.0, 0.0)

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 
 from websockets.sync.client import connect
 
-from quad_nav.view.codec import decode
+from quad_web.view.codec import decode
 
 
 @contextmanager

@@ -29,7 +29,7 @@ def obey_input(actions: SyntheticActions) -> None:
 
 
 def main() -> None:
-    from quad_nav.web.server import WebOptions, serve
+    from quad_web.server import WebOptions, serve
 
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter

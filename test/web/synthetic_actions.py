@@ -8,7 +8,7 @@ from typing import Any, Dict, List, Optional
 import numpy as np
 from synthetic_fleet import SyntheticFleet
 
-from quad_nav.view.actions import Actions, Answer, GoalChange, GoalFileView, ParameterView
+from quad_web.view.actions import Actions, Answer, GoalChange, GoalFileView, ParameterView
 
 
 def say(line: object) -> None:

@@ -10,7 +10,7 @@ from typing import Any, Dict, List, Optional
 import numpy as np
 from synthetic_scene import obstacles, scene, statuses, tracks
 
-from quad_nav.view.state import FleetState, Item
+from quad_web.view.state import FleetState, Item
 
 PERIOD_S = 0.1
 SPEED_MPS = 0.5

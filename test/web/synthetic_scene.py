@@ -7,7 +7,7 @@ from typing import Any, Dict, List, Tuple
 
 import numpy as np
 
-from quad_nav.view.state import Item
+from quad_web.view.state import Item
 
 Size = Tuple[float, float]
 

@@ -12,7 +12,7 @@ import signal
 import pytest
 from browser import until
 
-from quad_nav.web.arena import _pose
+from quad_web.arena import _pose
 
 MOUNT = """
 async (path) => {

@@ -16,10 +16,10 @@ from synthetic_actions import SyntheticActions
 from synthetic_fleet import SyntheticFleet
 from websockets.exceptions import ConnectionClosed
 
-from quad_nav.web import connections, page_limits
-from quad_nav.web import server as web_server
-from quad_nav.web.page_limits import MAX_OPENING
-from quad_nav.web.server import Server, WebOptions
+from quad_web import connections, page_limits
+from quad_web import server as web_server
+from quad_web.page_limits import MAX_OPENING
+from quad_web.server import Server, WebOptions
 
 TOKENS = ("--steer-token", "steer-abc", "--watch-token", "watch-def")
 PATIENCE_S = 20.0

@@ -19,8 +19,8 @@ from synthetic_fleet import SyntheticFleet
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from quad_nav.web import stream as web_stream
-from quad_nav.web.server import Server, WebOptions
+from quad_web import stream as web_stream
+from quad_web.server import Server, WebOptions
 
 TOKENS = {"steer_token": "steer-abc", "watch_token": "watch-def"}
 PATIENCE_S = 20.0

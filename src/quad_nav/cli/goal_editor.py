@@ -22,8 +22,8 @@ from quad_nav.mission.goal_file import MAX_BYTES, MAX_GOALS, parse_goals
 from quad_nav.report.preview_page import page_data, preview_page, robot_data
 from quad_nav.scenario.flight_setup import FlightOptions
 from quad_nav.scenario.preview import MissionPreview
-from quad_nav.view.actions import GoalChange
-from quad_nav.view.goal_files import GoalFiles, version_of
+from quad_web.view.actions import GoalChange
+from quad_web.view.goal_files import GoalFiles, version_of
 
 _LOOPBACK = "127.0.0.1"
 _PATIENCE_S = 10.0  # for the rest of a request

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.cli import EXIT_INTERRUPTED
-from quad_nav.cli.flight_page import FlightPage
+from quad_web.cli.flight_page import FlightPage
 from quad_nav.cli.options import (
     LIVE,
     echo,

@@ -31,7 +31,7 @@ from quad_nav.recording.bag_info import (
 )
 from quad_nav.recording.bag_robot import BagRobot
 from quad_nav.recording.messages import pose_from, stamp_ns
-from quad_nav.recording.recorded_obstacles import read_people
+from quad_web.replay.recorded_obstacles import read_people
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.crowd_record import CrowdRecord

@@ -29,7 +29,7 @@ from quad_nav.sim.colours import ROBOT_COLOURS
 from quad_nav.sim.contacts import Contact
 from quad_nav.topics.markers import ARROW, SPHERE, goal_markers, quadcopter_markers, scene_markers
 from quad_nav.topics.publishing import FlownPath
-from quad_nav.view.items import hit_points
+from quad_web.view.items import hit_points
 
 SUFFIX = ".rrd"
 _TIMELINE = "flight"

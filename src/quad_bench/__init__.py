@@ -1,0 +1,1 @@
+"""Benchmarks that others have defined: BARN, DynaBARN, and robots on a circle that swap sides."""

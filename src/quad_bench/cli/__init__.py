@@ -1,0 +1,1 @@
+"""Commands of `quad` that fly benchmarks."""

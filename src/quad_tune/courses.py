@@ -1,0 +1,265 @@
+"""Missions that candidates fly, in the search and held out from it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+
+from quad_nav.config.sources import source_paths
+from quad_nav.errors import InputError
+from quad_nav.mission.robot_goals import WatchedGoalFile
+from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
+from quad_nav.sim.simulation import SimulationParams
+from quad_tune.space import Assignments, costmap_paths
+
+HELD_OUT_SEED = 1_000_000
+"""Offset of the seeds of held-out flights."""
+RANDOM = "random"
+LIDAR = "lidar"
+_LIDAR_FIELDS = {"range": "range_max_m", "noise": "noise_std_m"}
+
+
+@dataclass(frozen=True)
+class Case:
+    """Flight that every candidate flies: a mission, by number and name, and a seed."""
+
+    course: int
+    name: str
+    seed: int
+
+
+@dataclass(frozen=True)
+class Mission:
+    """Scene with goals. Without both, a random mission, another one for each seed."""
+
+    scene: Optional[Path] = None
+    goals: Optional[Path] = None
+
+    @property
+    def is_random(self) -> bool:
+        """True for random missions."""
+        return self.scene is None and self.goals is None
+
+    @property
+    def name(self) -> str:
+        """Files of the mission, or "random"."""
+        if self.is_random:
+            return RANDOM
+        return " + ".join(str(path) for path in (self.scene, self.goals) if path is not None)
+
+
+@dataclass(frozen=True)
+class MissionOptions:
+    """Options of a course of missions.
+
+    Attributes:
+        missions: Missions of the search.
+        held_out: Missions that the search never flies; if empty, those of the search, with other
+            seeds.
+        config: Name or folder of the base configuration.
+        parameters: (path, value) pairs on top of the base, not searched.
+        robots: Number of robots, or None for as many as there are goal files.
+        size_m: Side of a random mission's arena, 0 for automatic.
+        seed: First seed.
+        time_limit_s: Time limit of a flight.
+        scans_per_s: Scans per simulated second.
+        simulation: Parameters of the simulation.
+    """
+
+    missions: Tuple[Mission, ...]
+    held_out: Tuple[Mission, ...] = ()
+    config: str = "default"
+    parameters: Tuple[Tuple[str, Any], ...] = ()
+    robots: Optional[int] = None
+    size_m: float = 0.0
+    seed: int = 0
+    time_limit_s: float = 300.0
+    scans_per_s: float = 20.0
+    simulation: SimulationParams = SimulationParams(jitter_m=0.3)
+
+
+class MissionCourse:
+    """Missions with start positions and noise from the seed, equal for every candidate."""
+
+    ends_at_contact = False
+
+    def __init__(self, options: MissionOptions) -> None:
+        self.options = options
+        self._missions = (*options.missions, *options.held_out)
+
+    @property
+    def config(self) -> str:
+        """Name or folder of the base configuration."""
+        return self.options.config
+
+    @property
+    def fixed(self) -> Tuple[Tuple[str, Any], ...]:
+        """Parameters on top of the base."""
+        return self.options.parameters
+
+    def search_cases(self, count: int) -> Tuple[Case, ...]:
+        """Return this many flights, in turn through the missions of the search."""
+        return _cases(self._missions, range(len(self.options.missions)), self.options.seed, count)
+
+    def held_out_cases(self, count: int) -> Tuple[Case, ...]:
+        """Return this many flights with seeds, and missions if given, held out."""
+        first = len(self.options.missions) if self.options.held_out else 0
+        last = len(self._missions)
+        return _cases(self._missions, range(first, last), self.options.seed + HELD_OUT_SEED, count)
+
+    def setup(self, case: Case, assignments: Assignments) -> FlightSetup:
+        """Read a flight from its files.
+
+        Raises:
+            InputError: The parameters are invalid, or the files cannot be read.
+        """
+        mission, given = self._missions[case.course], self.options
+        world, parameters = _split(assignments)
+        options = FlightOptions(
+            mission.scene,
+            mission.goals,
+            given.config,
+            (*_single(given.parameters), *parameters),
+            given.robots,
+            case.seed,
+            given.size_m,
+            given.time_limit_s,
+            given.scans_per_s,
+            _simulation(given.simulation, world),
+            strict=not assignments,  # a candidate may choose a planner, and set another one's
+        )
+        return _without_files(read_setup(options))
+
+    def identity(self) -> Dict[str, Any]:
+        """Return what flights depend on besides candidate and case, as plain JSON."""
+        given = self.options
+        return {
+            "config": {"name": given.config, "files": files_digest(*source_paths(given.config))},
+            "parameters": dict(given.parameters),
+            "missions": [_described(mission) for mission in given.missions],
+            "held_out": [_described(mission) for mission in given.held_out],
+            "robots": given.robots,
+            "size_m": given.size_m,
+            "time_limit_s": given.time_limit_s,
+            "scans_per_s": given.scans_per_s,
+            "simulation": asdict(given.simulation),
+        }
+
+
+def check_missions(options: MissionOptions) -> List[str]:
+    """Check the files and parameters of all missions and return the warnings.
+
+    Raises:
+        InputError: Lists every fault.
+    """
+    course = MissionCourse(options)
+    problems: List[str] = []
+    warnings: List[str] = []
+    twice = set(options.missions) & set(options.held_out)
+    problems += [
+        f"held out: {mission.name} is also a mission of the search; expected another mission"
+        for mission in twice
+        if not mission.is_random
+    ]
+    if options.seed >= HELD_OUT_SEED:
+        problems.append(
+            f"seed: {options.seed}, expected less than {HELD_OUT_SEED}, the first held-out seed"
+        )
+    cases = [
+        *course.search_cases(len(options.missions)),
+        *course.held_out_cases(max(len(options.held_out), 1)),
+    ]
+    for case in cases:
+        try:
+            warnings += course.setup(case, ()).warnings
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(list(dict.fromkeys(problems)))
+    return list(dict.fromkeys(warnings))
+
+
+def files_digest(*paths: Path) -> str:
+    """Return a digest of files, or of the YAML and JSON files in folders, with names."""
+    digest = hashlib.sha256()
+    for path in paths:
+        files = (
+            [path]
+            if path.is_file()
+            else sorted(entry for pattern in ("*.yaml", "*.json") for entry in path.glob(pattern))
+        )
+        for file in files:
+            digest.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+def _cases(
+    missions: Sequence[Mission], numbers: Sequence[int], seed: int, count: int
+) -> Tuple[Case, ...]:
+    among = len(numbers)
+    return tuple(
+        Case(numbers[k % among], missions[numbers[k % among]].name, seed + k // among)
+        for k in range(count)
+    )
+
+
+def _described(mission: Mission) -> Dict[str, str]:
+    paths = [path for path in (mission.scene, mission.goals) if path is not None]
+    return {"name": mission.name, "files": files_digest(*paths)}
+
+
+def _split(assignments: Assignments) -> Tuple[Dict[str, Any], Assignments]:
+    """Split assignments into values of the LIDAR, by name, and parameters of move_base."""
+    world = {
+        path.split("/", 1)[1]: value for path, value in assignments if path.startswith(f"{LIDAR}/")
+    }
+    return world, tuple(pair for pair in assignments if not pair[0].startswith(f"{LIDAR}/"))
+
+
+def _single(parameters: Sequence[Tuple[str, Any]]) -> Assignments:
+    return tuple((single, value) for path, value in parameters for single in costmap_paths(path))
+
+
+def _simulation(simulation: SimulationParams, world: Mapping[str, Any]) -> SimulationParams:
+    """Replace the LIDAR's values.
+
+    ``lidar/range`` and ``lidar/noise`` are in metres, ``lidar/scan_range`` in radians.
+    """
+    lidar = simulation.lidar
+    for name, value in world.items():
+        if name not in (*_LIDAR_FIELDS, "scan_range", "beams"):
+            raise InputError(
+                [
+                    f"{LIDAR}/{name}: unknown; expected {LIDAR}/range, {LIDAR}/noise, "
+                    f"{LIDAR}/scan_range or {LIDAR}/beams"
+                ]
+            )
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise InputError([f"{LIDAR}/{name}: {value!r}, expected a number"])
+        if not (value > 0 or name == "noise") or not math.isfinite(value):
+            raise InputError([f"{LIDAR}/{name}: {value!r}, expected more than 0"])
+        if name in _LIDAR_FIELDS:
+            lidar = replace(lidar, **{_LIDAR_FIELDS[name]: float(value)})
+    scan_range = float(world.get("scan_range", lidar.scan_range_rad))
+    beams = round(world.get("beams", lidar.beam_count))
+    return replace(
+        simulation,
+        lidar=replace(lidar, scan_range_rad=scan_range, step_size_rad=scan_range / beams),
+    )
+
+
+def _without_files(setup: FlightSetup) -> FlightSetup:
+    """Detach the goals from their files, which may not exist on the worker's machine."""
+    robots = tuple(
+        replace(robot, file=WatchedGoalFile(Path(robot.file.path).name)) for robot in setup.robots
+    )
+    return replace(setup, robots=robots)
+
+
+def identity_text(identity: Mapping[str, Any]) -> str:
+    """Serialize an identity with sorted keys."""
+    return json.dumps(identity, sort_keys=True, default=str)

@@ -1,0 +1,1 @@
+"""Commands of `quad` that serve a page."""

@@ -1,0 +1,75 @@
+"""The page of ``quad fly --web``: its server, and the people on it between two flights."""
+
+from __future__ import annotations
+
+import webbrowser
+from typing import Callable, List
+
+from quad_nav.cli.options import echo
+from quad_nav.offline.flight import FlightObserver
+from quad_web.offline.actions import STARTED_AGAIN, FlightActions
+from quad_web.offline.view import WebView
+from quad_web.process import ServerProcess
+from quad_web.server import Urls, WebOptions
+
+_LOOKS_EVERY_S = 0.2
+
+
+class FlightPage:
+    """The page, served until ``close``.
+
+    Raises:
+        InputError: NiceGUI is not installed, or the address cannot be listened on.
+    """
+
+    def __init__(self, address: str, port: int, rate: float, open_it: bool) -> None:
+        self._actions = FlightActions(rate)
+        options = WebOptions(address=address, port=port, title="quad fly")
+        self._process = ServerProcess(options, FlightActions.available)
+        announce(self._process.urls, open_it)
+
+    @property
+    def interventions(self) -> List[str]:
+        """What people did in the last flight."""
+        return self._actions.done
+
+    def observer(self) -> FlightObserver:
+        """Return what shows the next flight."""
+        return WebView(self._process, self._actions)
+
+    def wants_flight(self, is_interrupted: Callable[[], bool]) -> bool:
+        """Wait until people want another flight.
+
+        Args:
+            is_interrupted: Returns true after Ctrl-C.
+
+        Returns:
+            False if there will be none: Ctrl-C, or the server has ended.
+        """
+        while self._actions.stop_reason != STARTED_AGAIN:
+            if not self._process.is_alive:
+                echo("page: its server has ended", err=True)
+                return False
+            if is_interrupted():
+                return False
+            self._process.wait(_LOOKS_EVERY_S)
+            self._process.poll()
+            calls, self._process.calls = self._process.calls, []
+            for call in calls:
+                self._process.answer(call, self._actions.carry_out(call.name, call.arguments))
+        return True
+
+    def close(self) -> None:
+        """End the server."""
+        self._process.close()
+
+
+def announce(urls: Urls, open_it: bool) -> None:
+    """Print where the page is, and open it."""
+    if urls.watch == urls.steer:
+        echo(f"page: {urls.steer}", err=True)
+    else:
+        echo(f"page, to steer: {urls.steer}", err=True)
+        echo(f"page, to watch: {urls.watch}", err=True)
+    if open_it and not webbrowser.open(urls.steer):
+        echo(f"--open: no browser found; open {urls.steer}", err=True)

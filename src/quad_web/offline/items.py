@@ -1,0 +1,244 @@
+"""The items of a page from a running offline flight."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Dict, FrozenSet, List, Optional, Sequence, Set, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.costmap.cost_grid import occupancy
+from quad_nav.loop.inspection import (
+    GLOBAL_COSTMAP,
+    LOCAL_COSTMAP,
+    LOCAL_PLAN,
+    PLAN,
+    SCAN,
+    TRACK,
+    Inspection,
+    NavigatorView,
+)
+from quad_nav.mission.sequencer import Sequencer
+from quad_nav.offline.flight import Flight
+from quad_web.offline.actions import HAS_ENDED, FlightActions
+from quad_nav.sim.contacts import Contact
+from quad_nav.topics.tracked_obstacles import track_rows
+from quad_web.view import rows
+from quad_web.view.cells import cell_items
+from quad_web.view.items import (
+    ObstacleItems,
+    Trails,
+    costmap_item,
+    line_item,
+    moving_solids,
+    poses_item,
+    robots_item,
+    scan_item,
+    scene_item,
+    track_item,
+)
+from quad_web.view.state import Item, Wanted, robots_by_layer
+
+TRACK_PERIOD_S = 0.2
+_PARTS = (PLAN, LOCAL_PLAN, SCAN, GLOBAL_COSTMAP, LOCAL_COSTMAP, TRACK)
+
+
+class FlightItems:
+    """Makes the items of a flight that pages show, and only these."""
+
+    def __init__(self, flight: Flight) -> None:
+        """Show a flight from its start on."""
+        self._flight = flight
+        self._names = [robot.name for robot in flight.robots]
+        self._robots = range(len(self._names))
+        self._contacts: List[Contact] = []
+        self._failed: Dict[int, Set[int]] = {robot: set() for robot in self._robots}
+        self._trails, self._obstacles = Trails(), ObstacleItems()
+        self._next_track_s = -math.inf
+        self._has_static = self._has_goals = False
+        self._shown: Set[str] = set()  # keys of items that may disappear
+        self._has_contacts = True
+
+    def track(self, flight: Flight) -> None:
+        """Add the robots' positions to their trails; called at each odometry."""
+        if flight.now_s < self._next_track_s:
+            return
+        self._next_track_s = flight.now_s + TRACK_PERIOD_S
+        for robot, (x_m, y_m, _) in enumerate(flight.states.poses.tolist()):
+            self._trails.add(robot, x_m, y_m)
+
+    def add_contact(self, contact: Contact) -> None:
+        """Show a contact from now on."""
+        self._contacts.append(contact)
+        self._has_contacts = True
+
+    def note_goals(self, robot: int, failed: Optional[int] = None) -> None:
+        """Show the goals anew: one of a robot was sent or has ended, and ``failed`` failed."""
+        if failed is not None:
+            self._failed[robot].add(failed)
+        self._has_goals = False
+
+    def sample(
+        self, wanted: Optional[Sequence[Wanted]], actions: FlightActions, rate: float
+    ) -> Tuple[List[Item], Tuple[str, ...]]:
+        """Return new items, and the keys of items that are gone.
+
+        Args:
+            wanted: What the pages show; None for everything.
+            actions: What people want.
+            rate: Simulated seconds per second of wall time that were achieved.
+        """
+        robots_of = robots_by_layer(wanted, self._robots)
+        views = self._flight.loop.inspect(
+            Inspection({part: robots_of[part] for part in _PARTS if robots_of[part]})
+        )
+        items = [] if self._has_static else self._static_items()
+        if self._has_contacts:
+            items.append(rows.contacts_item(self._contacts, self._names))
+        if not self._has_goals:
+            items.append(rows.goals_item(self._goal_rows()))
+        self._has_static = self._has_goals = True
+        self._has_contacts = False
+        items += self._present_items(views, actions, rate)
+        items += self._trails.items(sorted(robots_of["trail"]))
+        passing = self._cells(views, robots_of["cell"])
+        for view in views:
+            passing += _navigator_items(view)
+        keys = {item.key for item in passing}
+        removed, self._shown = tuple(self._shown - keys), keys
+        return items + passing, removed
+
+    def _static_items(self) -> List[Item]:
+        setup = self._flight.setup
+        return [scene_item(setup.scene), robots_item(self._names, setup.robot_radius_m)]
+
+    def _goal_rows(self) -> List[Dict[str, object]]:
+        return [
+            row
+            for number, robot in enumerate(self._flight.robots)
+            for row in rows.goal_rows(
+                number,
+                robot.sequencer.sequence.goals,
+                robot.sequencer.index,
+                robot.sequencer.active_goal is not None,
+                self._failed[number],
+            )
+        ]
+
+    def _present_items(
+        self, views: Sequence[NavigatorView], actions: FlightActions, rate: float
+    ) -> List[Item]:
+        """Return what changes all the time, of all robots."""
+        flight, setup = self._flight, self._flight.setup
+        poses = poses_item(flight.now_s, time.time(), flight.states.bodies.rows)
+        moving = flight.simulation.movers.poses(flight.now_s)
+        samples = self._samples_item(poses, moving, views)
+        values = samples.arrays["values"]
+        yields = [
+            row
+            for view in views
+            for row in rows.yield_rows(view.robot, view.decision, view.limited_by, self._names)
+        ]
+        status = [self._status_row(view, values[view.robot], actions) for view in views]
+        return [
+            rows.flight_item(
+                "offline",
+                setup.scene.name,
+                actions.state,
+                flight.now_s,
+                rate=rate,
+                wanted_rate=actions.rate,
+                reason=flight.reason,
+            ),
+            poses,
+            *self._obstacles.items(setup.scene, moving),
+            samples,
+            rows.yields_item(yields),
+            *([rows.status_item(status)] if status else []),
+        ]
+
+    def _samples_item(
+        self, poses: Item, moving: NDArray[np.float64], views: Sequence[NavigatorView]
+    ) -> Item:
+        """Return the samples of robots at poses among obstacles at poses float64[m, 3]."""
+        setup = self._flight.setup
+        cycles_s = np.full(len(self._names), np.nan)
+        for view in views:
+            if view.cycle_wall_s is not None:
+                cycles_s[view.robot] = view.cycle_wall_s
+        return rows.samples_item(
+            self._flight.now_s,
+            poses.arrays["pose"],
+            cycles_s,
+            setup.robot_radius_m,
+            setup.scene,
+            moving_solids(setup.scene, moving),
+        )
+
+    def _status_row(
+        self, view: NavigatorView, sample: Sequence[float], actions: FlightActions
+    ) -> Dict[str, object]:
+        robot = self._flight.robots[view.robot]
+        sequencer, speed_mps = robot.sequencer, float(sample[2])
+        state = rows.robot_state(
+            view.state.value,
+            speed_mps,
+            yielding=view.decision,
+            is_done=sequencer.done,
+            is_stopped=view.stopped_reason != "",
+        )
+        reason = view.stopped_reason
+        if actions.state == "ended":
+            state, speed_mps = "done" if sequencer.done else "stopped", 0.0
+            reason = reason or HAS_ENDED
+        goal = None if sequencer.done else sequencer.index + 1
+        return rows.status_row(
+            view.robot,
+            state,
+            goal=goal,
+            goals=len(sequencer.sequence.goals),
+            distance_m=self._distance_m(view.robot, sequencer),
+            speed_mps=speed_mps,
+            gap_m=float(sample[0]),
+            recoveries=(view.recoveries_done, view.recoveries),
+            lidar=actions.lidars[view.robot],
+            reason=reason,
+        )
+
+    def _distance_m(self, robot: int, sequencer: Sequencer) -> float:
+        active = sequencer.active_goal
+        if active is None:
+            return math.nan
+        x_m, y_m, _ = self._flight.states.poses[robot].tolist()
+        return math.hypot(active.goal.x_m - x_m, active.goal.y_m - y_m)
+
+    def _cells(self, views: Sequence[NavigatorView], robots: FrozenSet[int]) -> List[Item]:
+        positions, scene = self._flight.states.poses[:, :2], self._flight.setup.scene
+        return [
+            item
+            for view in views
+            if view.robot in robots
+            for item in cell_items(scene, positions, view.safety_radius_m, [view.robot])
+        ]
+
+
+def _navigator_items(view: NavigatorView) -> List[Item]:
+    """Return the layers of a robot that were asked for."""
+    items = []
+    for layer, points in ((PLAN, view.plan), (LOCAL_PLAN, view.local_plan)):
+        if points is not None:
+            items.append(line_item(layer, view.robot, points))
+    if view.scan is not None:
+        items.append(scan_item(view.robot, *view.scan))
+    if view.track is not None:
+        rows_of = track_rows(view.track.tracks, view.track.unseen_s)
+        items.append(track_item(view.robot, rows_of, view.track.map_from_frame))
+    for layer, costmap in view.costmaps.items():
+        items.append(
+            costmap_item(
+                layer, view.robot, costmap.spec, occupancy(costmap.costs), costmap.map_from_frame
+            )
+        )
+    return items

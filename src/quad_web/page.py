@@ -1,0 +1,258 @@
+"""Lay out the page: panels around the arena.
+
+On a wide screen the arena is in the middle, robots and the two editors are beside it, and charts,
+events and diagnostics below. On a phone the arena is on top, the panels are behind tabs, and the
+button that stops every robot stays at the bottom.
+
+``data-testid``: ``tool-view``, ``tool-goal``, ``mode`` (2D, 3D), ``layers`` (its menu
+has ``layer-<name>``), ``side-<panel>``, ``dock-<panel>`` and ``phone-<panel>`` (tabs), and
+``panel-<panel>``. Those of the panels are in their modules.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Dict, Optional
+
+from nicegui import background_tasks, context, ui
+
+from quad_nav.errors import excerpt
+from quad_web.view.actions import Actions, Answer, Role
+from quad_web.view.state import FleetState
+from quad_web.arena import SHOWN, SHOWN_AT_FIRST, Arena, Charts
+from quad_web.flight_bar import FlightBar, StopButton, enable
+from quad_web.goal_panel import GoalEditor
+from quad_web.log_panels import Diagnostics, EventLog
+from quad_web.page_client import PageClient
+from quad_web.parameter_panel import Parameters
+from quad_web.robot_panels import RobotCard, RobotTable
+
+_STYLE = Path(__file__).parent / "static" / "page.css"
+_LONGEST = 600  # characters of an answer
+_REFRESH_S = 0.5
+_FULL_SPEED_REFRESH_S = 1.0  # the flight needs the processor
+_READ_S = 2.0  # parameters and goal files, which others change, too
+
+SIDE = {"robots": "Robots", "parameters": "Parameters", "goals": "Goals"}
+DOCK = {"charts": "Charts", "events": "Events", "diagnostics": "Diagnostics"}
+PHONE = {
+    "robots": "Robots",
+    "robot": "Robot",
+    "charts": "Charts",
+    "events": "Events",
+    "parameters": "Params",
+    "goals": "Goals",
+    "diagnostics": "Diag",
+}
+
+
+def build_page(state: FleetState, actions: Actions, client_role: Role) -> None:
+    """Build the page of one client; NiceGUI calls it for each page that is opened.
+
+    Args:
+        state: What is shown; the log of events also gets what came of the page's actions.
+        actions: What a person can do. A page that may only watch gets a ``WatchOnly``, which
+            refuses everything, whatever its handlers do.
+        client_role: Whether the person may steer.
+    """
+    Page(state, actions, client_role)
+
+
+class Page:
+    """One page: the arena, its toolbar, and the panels."""
+
+    def __init__(self, state: FleetState, actions: Actions, role: Role) -> None:
+        """Make all elements, and refresh them while the page is open."""
+        self._nicegui = context.client
+        self.client = PageClient(state, actions, role, self._toast)
+        self._panels: Dict[str, Any] = {}
+        self._tabs: Dict[str, Any] = {}
+        ui.add_css(_STYLE)
+        ui.colors(primary="#0b63ce", negative="#c62828", positive="#2e7d32", warning="#b45309")
+        with ui.element("div").classes("page"):
+            self.bar = FlightBar(self.client)
+            self.stop = StopButton(self.client)
+            with ui.element("div").classes("arena-box"):
+                self._make_arena()
+            self._make_tabs("phone", PHONE)
+            with ui.element("div").classes("side"):
+                self._make_tabs("side", SIDE)
+                self._make_side()
+            with ui.element("div").classes("dock"):
+                self._make_tabs("dock", DOCK)
+                self._make_dock()
+        self._show_panels()
+        self._show_tool("view")
+        self.client.on_select(self._selected)
+        self.refresh()
+        self._timer: Any = None
+        self._nicegui.on_connect(self._begin)
+
+    def _begin(self) -> None:
+        """Refresh from the first connection on; NiceGUI deletes the timers with the client.
+
+        A timer would keep a page for a minute that is only asked for.
+        """
+        if self._timer is None:
+            self._timer = ui.timer(_REFRESH_S, self._tick)
+            ui.timer(_READ_S, self._read)
+
+    # -- elements --------------------------------------------------------------------
+
+    def _make_arena(self) -> None:
+        role = self.client.role
+        self.arena = Arena(role)
+        self.arena.on_select(self.client.select)
+        self.arena.on_goal(self._goal_chosen)
+        self.arena.on_edit(lambda goals: self.goals.take(goals))
+        self.arena.on_tool(self.set_tool)
+        self.arena.on_mode(self._mode_shown)
+        with ui.element("div").classes("toolbar"):
+            with ui.element("div").classes("group"):
+                self._tools = {
+                    "view": ui.button(icon="near_me", on_click=lambda: self.set_tool("view")),
+                    "goal": ui.button(
+                        icon="add_location_alt", on_click=lambda: self.set_tool("goal")
+                    ),
+                }
+                self._tools["view"].props("flat dense data-testid=tool-view title='Select'")
+                self._tools["goal"].props("flat dense data-testid=tool-goal title='Send goal'")
+                enable(self._tools["goal"], self.client, "send_goal")
+            with ui.element("div").classes("group"):
+                options = {"2d": "2D", "3d": "3D"}
+                self._mode = ui.toggle(options, value="2d", on_change=self._set_mode)
+                self._mode.props("dense unelevated no-caps data-testid=mode")
+            with ui.element("div").classes("group"), self._layers_button():
+                self._make_layers()
+
+    def _layers_button(self) -> ui.button:
+        button = ui.button(icon="layers")
+        button.props("flat dense data-testid=layers title='Layers'")
+        return button
+
+    def _make_layers(self) -> None:
+        self._switches: Dict[str, ui.switch] = {}
+        with ui.menu().classes("layers"):
+            for name, label in SHOWN.items():
+                is_on = name in SHOWN_AT_FIRST
+                switch = ui.switch(label, value=is_on, on_change=lambda: self._set_layers())
+                self._switches[name] = switch.props(f"dense data-testid=layer-{name}")
+
+    def _make_tabs(self, place: str, names: Dict[str, str]) -> None:
+        first: Any = next(iter(names))  # the name of a tab does, too
+        with ui.tabs(value=first, on_change=self._tab_chosen) as tabs:
+            tabs.classes(f"{place}-tabs").props("dense no-caps inline-label align=left")
+            for name, label in names.items():
+                ui.tab(name, label).props(f"data-testid={place}-{name}")
+        self._tabs[place] = tabs
+
+    def _panel(self, name: str) -> Any:
+        panel = ui.element("section").classes(f"panel panel-{name}")
+        self._panels[name] = panel.props(f"data-testid=panel-{name}")
+        return panel
+
+    def _make_side(self) -> None:
+        with self._panel("robots"):
+            self.table = RobotTable(self.client, lambda: self.arena.follow(True))
+        with self._panel("robot"):
+            self.card = RobotCard(self.client, self.set_tool)
+        with self._panel("parameters"):
+            self.parameters = Parameters(self.client)
+        with self._panel("goals"):
+            self.goals = GoalEditor(self.client, self.arena.edit_goals, self.set_tool)
+
+    def _make_dock(self) -> None:
+        with self._panel("charts"):
+            self.charts = Charts()
+        with self._panel("events"):
+            self.events = EventLog(self.client)
+        with self._panel("diagnostics"):
+            self.diagnostics = Diagnostics(self.client)
+
+    # -- what it shows ---------------------------------------------------------------
+
+    def _tick(self) -> None:
+        self.refresh()
+        flight = self.client.data("flight")
+        is_at_full_speed = flight.get("wanted_rate") == 0.0 and flight.get("state") == "running"
+        self._timer.interval = _FULL_SPEED_REFRESH_S if is_at_full_speed else _REFRESH_S
+
+    def refresh(self) -> None:
+        """Show what has changed in the state."""
+        for panel in (self.bar, self.table, self.card, self.events, self.diagnostics):
+            panel.refresh()
+        problems = self.diagnostics.problems
+        for place in ("dock", "phone"):
+            classes = {"add": "has-problems"} if problems else {"remove": "has-problems"}
+            self._tabs[place].classes(**classes)
+
+    async def _read(self) -> None:
+        """Read what an action must be asked for, while it is shown."""
+        if self._is_shown("parameters"):
+            await self.parameters.refresh()
+        if self._is_shown("goals"):
+            await self.goals.refresh()
+
+    def _is_shown(self, panel: str) -> bool:
+        """Return whether a panel's tab is open; which of the two rows is seen, CSS decides."""
+        return any(tabs.value == panel for tabs in self._tabs.values())
+
+    def _show_panels(self) -> None:
+        for name, panel in self._panels.items():
+            for place, tabs in self._tabs.items():
+                is_on = tabs.value == name or (
+                    place == "side" and name == "robot" and tabs.value == "robots"
+                )
+                classes = {"add": f"on-{place}"} if is_on else {"remove": f"on-{place}"}
+                panel.classes(**classes)
+
+    async def _tab_chosen(self) -> None:
+        self._show_panels()
+        await self._read()
+
+    def _toast(self, answer: Answer) -> None:
+        with self._nicegui:
+            kind: Any = "positive" if answer.ok else "negative"
+            timeout = 3000 if answer.ok else 8000
+            ui.notify(
+                excerpt(answer.text, _LONGEST),
+                type=kind,
+                position="top",
+                timeout=timeout,
+                multi_line=True,
+            )
+
+    # -- what it does ----------------------------------------------------------------
+
+    def set_tool(self, tool: str) -> None:
+        """Choose what the mouse does in the arena: "view", "goal" or "edit"."""
+        if self.client.role is not Role.STEER:
+            tool = "view"
+        if tool != "view":
+            self.arena.follow(False)  # the ground must not move under the pointer
+        self.arena.set_tool(tool)
+        self._show_tool(tool)
+
+    def _show_tool(self, tool: str) -> None:
+        for name, button in self._tools.items():
+            classes = {"add": "is-on"} if name == tool else {"remove": "is-on"}
+            button.classes(**classes)
+        self.goals.set_editing(tool == "edit")
+
+    def _set_mode(self) -> None:
+        self.arena.set_mode(self._mode.value)
+
+    def _mode_shown(self, mode: str) -> None:
+        self._mode.value = mode
+
+    def _set_layers(self) -> None:
+        shown = [name for name, switch in self._switches.items() if switch.value]
+        self.arena.set_layers(shown)
+
+    def _selected(self, robot: Optional[int]) -> None:
+        self.arena.select(robot)
+        self.charts.select(robot)
+        background_tasks.create(self._read(), name="read the selected robot")
+
+    async def _goal_chosen(self, x_m: float, y_m: float, yaw_rad: Optional[float]) -> None:
+        await self.card.send(x_m, y_m, yaw_rad)

@@ -1,0 +1,327 @@
+"""A recorded flight at any time, as items of a page."""
+
+from __future__ import annotations
+
+import bisect
+import math
+import re
+import time
+from pathlib import Path
+from typing import Any, Callable, Dict, Hashable, Iterable, List, Mapping, Optional, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.errors import InputError
+from quad_nav.geometry import Pose2D, Scan
+from quad_nav.recording.bag_file import Progress, no_progress
+from quad_nav.recording.bag_index import RecordingIndex
+from quad_nav.recording.bag_trace import read_recording
+from quad_web.replay.recorded_costmaps import CostmapTrack
+from quad_web.replay.recorded_obstacles import ObstacleTrack
+from quad_web.replay.recorded_robot import (
+    LOST_AFTER_S,
+    RecordedEvent,
+    RobotTrack,
+    decision_of,
+    events_of,
+)
+from quad_nav.sim.lidar import base_from_lidar
+from quad_nav.topics.markers import OBSTACLES_TOPIC
+from quad_nav.topics.tracked_obstacles import MARKERS_TOPIC, rows_of_markers
+from quad_web.view import rows
+from quad_web.view.cells import cell_items
+from quad_web.view.items import (
+    costmap_item,
+    line_item,
+    poses_item,
+    robots_item,
+    scan_item,
+    scene_item,
+    track_item,
+)
+from quad_web.view.state import Item
+
+SHOWN_FOR_S = 1.0
+"""Scans, local plans and tracks are shown for so long, unless there are newer ones."""
+_MARGIN_M = 0.05  # of peers, where the recording has no parameters
+_LAYERS = {
+    "scan": (r"/scan([0-9]{1,4})", "sensor_msgs/LaserScan"),
+    "local_plan": (r"/move_base([0-9]{1,4})/[^/]+/local_plan", "nav_msgs/Path"),
+    "global_costmap": (
+        r"/move_base([0-9]{1,4})/global_costmap/costmap",
+        "nav_msgs/OccupancyGrid",
+    ),
+    "local_costmap": (r"/move_base([0-9]{1,4})/local_costmap/costmap", "nav_msgs/OccupancyGrid"),
+    "track": (rf"/move_base([0-9]{{1,4}})/{MARKERS_TOPIC}", "visualization_msgs/MarkerArray"),
+}
+_PASSING = ("scan", "local_plan", "track")
+_UPDATES = r"/move_base[0-9]{1,4}/(global|local)_costmap/costmap_updates"
+
+Part = Tuple[Hashable, Callable[[], Optional[Item]]]
+"""What identifies the state of an item, and what makes it."""
+
+
+class RecordedFlight:
+    """A recorded flight. Its methods are called by one thread.
+
+    Attributes:
+        title: Name of the file.
+        names: Names of the robots.
+        start_s: Time of the first pose.
+        end_s: Time of the last pose.
+        events: The log of events in order.
+        end_reason: Why the flight ended early, "" if it did not.
+    """
+
+    def __init__(self, path: Path, progress: Progress = no_progress) -> None:
+        """Read the trace, and the index of what is read on demand.
+
+        Args:
+            path: The recording.
+            progress: Called often with the share that is read.
+
+        Raises:
+            InputError: As ``bag_trace.read_trace``.
+        """
+        reader = read_recording(path, progress)
+        self._trace = trace = reader.trace(path)
+        self._index = RecordingIndex(path, _is_wanted)
+        self.title, self.end_reason = path.name, trace.reason
+        self.names = [robot.name for robot in trace.robots]
+        numbers = sorted(number for number, one in reader.robots.items() if one.has_odometry)
+        self._rows = {number: row for row, number in enumerate(numbers)}
+        self._tracks = [RobotTrack(robot) for robot in trace.robots]
+        self.start_s = min(float(robot.times_s[0]) for robot in trace.robots)
+        self.end_s = max(float(robot.times_s[-1]) for robot in trace.robots)
+        clock, index = reader.clock, self._index
+        self._times = {topic: clock.times_s(index.times_ns(topic)) for topic in index.kinds}
+        self._topics = self._topics_by_layer()
+        obstacles_s = self._times.get(OBSTACLES_TOPIC)
+        self._obstacles = ObstacleTrack(trace.scene, trace.seed, self._index, obstacles_s)
+        self._costmaps: Dict[str, CostmapTrack] = {}
+        self._has_time: Callable[[], bool] = lambda: True
+        self.events = events_of(trace.robots)
+        self.events += [
+            RecordedEvent(contact.time_s, "warning", None, str(contact))
+            for contact in trace.contacts
+        ]
+        self.events.sort(key=lambda event: event.time_s)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._index.close()
+
+    @property
+    def static_items(self) -> List[Item]:
+        """The items that stay the same."""
+        items = [robots_item(self.names, self._trace.robot_radius_m)]
+        return items + ([scene_item(self._trace.scene)] if self._trace.scene else [])
+
+    def parts(
+        self,
+        time_s: float,
+        robots_of: Mapping[str, Iterable[int]],
+        has_time: Callable[[], bool] = lambda: True,
+    ) -> Dict[str, Part]:
+        """Return the layers at a time, by the items' keys.
+
+        Args:
+            time_s: Time of the flight.
+            robots_of: Robots of which a layer is shown, by layer.
+            has_time: Asked while a costmap is put together. Without time there is no item; the
+                next call goes on from there.
+        """
+        self._has_time = has_time
+        parts: Dict[str, Part] = {}
+        for layer, robots in robots_of.items():
+            for robot in robots:
+                part = self._part(layer, robot, time_s)
+                if part is not None:
+                    parts[f"{layer}/{robot}"] = part
+        return parts
+
+    def present_items(self, time_s: float) -> List[Item]:
+        """Return the items of all robots at a time."""
+        bodies = np.array([track.body(time_s) for track in self._tracks])
+        poses = poses_item(time_s, time.time(), bodies)
+        samples = self.sample(time_s, poses)
+        values = samples.arrays["values"]
+        status = [self._status_row(row, time_s, values[row]) for row in range(len(self.names))]
+        rights = [track.right_of_way(time_s) for track in self._tracks]
+        yields = [
+            line
+            for row, right in enumerate(rights)
+            for line in rows.yield_rows(row, decision_of(right), right.limited_by, self.names)
+        ]
+        contacts = [one for one in self._trace.contacts if one.time_s <= time_s]
+        goals = [
+            line for row, track in enumerate(self._tracks) for line in track.goal_rows(row, time_s)
+        ]
+        return [
+            poses,
+            *self._obstacles.items(time_s),
+            samples,
+            rows.status_item(status),
+            rows.yields_item(yields),
+            rows.contacts_item(contacts, self.names),
+            rows.goals_item(goals),
+        ]
+
+    def sample(self, time_s: float, poses: Optional[Item] = None) -> Item:
+        """Return the item ``samples`` at a time; ``poses`` is the one of that time."""
+        if poses is None:
+            bodies = np.array([track.body(time_s) for track in self._tracks])
+            poses = poses_item(time_s, 0.0, bodies)
+        unknown = np.full(len(self.names), np.nan)
+        return rows.samples_item(
+            time_s,
+            poses.arrays["pose"],
+            unknown,
+            self._trace.robot_radius_m,
+            self._trace.scene,
+            self._obstacles.solids(time_s),
+        )
+
+    def _status_row(self, row: int, time_s: float, sample: NDArray[np.float32]) -> Dict[str, Any]:
+        track = self._tracks[row]
+        age_s = track.age_s(time_s)
+        leg, goals = track.leg(time_s), track.goals
+        is_active = leg is not None and track.is_active(leg, time_s)
+        is_done = bool(goals) and leg is not None and not is_active and leg.index + 1 >= len(goals)
+        state = rows.robot_state(
+            track.state(time_s),
+            float(sample[2]),
+            yielding=decision_of(track.right_of_way(time_s)),
+            is_done=is_done,
+            is_lost=age_s > LOST_AFTER_S,
+        )
+        body = track.body(time_s)
+        distance_m = math.nan
+        if leg is not None and is_active:
+            distance_m = math.hypot(leg.pose.x_m - body[0], leg.pose.y_m - body[1])
+        return rows.status_row(
+            row,
+            state,
+            goal=leg.index + 1 if leg is not None and is_active else None,
+            goals=len(goals) or None,
+            distance_m=distance_m,
+            speed_mps=float(sample[2]),
+            gap_m=float(sample[0]),
+            recoveries=track.recoveries(time_s),
+            age_s=age_s,
+        )
+
+    # -- layers --------------------------------------------------------------------------
+
+    def _part(self, layer: str, robot: int, time_s: float) -> Optional[Part]:
+        track = self._tracks[robot]
+        if layer == "trail":
+            end = track.trail_end(time_s)
+            return end, lambda: line_item("trail", robot, track.trail(end))
+        if layer == "plan":
+            number = track.plan_number(time_s)
+            if number is None:
+                return None
+            return number, lambda: line_item("plan", robot, track.robot.plans[number][1])
+        if layer == "cell":
+            return time_s, lambda: self._cell(robot, time_s)
+        topic = self._topics.get((layer, robot))
+        if topic is None:
+            return None
+        if layer in _PASSING:
+            return self._passing_part(layer, robot, topic, time_s)
+        costmap = self._costmap(topic)
+        place = costmap.place(time_s)
+        return place and (place, lambda: self._costmap_item(layer, robot, costmap, place, time_s))
+
+    def _passing_part(self, layer: str, robot: int, topic: str, time_s: float) -> Optional[Part]:
+        """Return a scan, a local plan or tracks, unless they are old."""
+        number = int(np.searchsorted(self._times[topic], time_s, side="right")) - 1
+        if number < 0 or time_s - self._times[topic][number] > SHOWN_FOR_S:
+            return None
+        make = {"scan": self._scan, "local_plan": self._local_plan, "track": self._track}[layer]
+        return number, lambda: make(robot, topic, number)
+
+    def _scan(self, robot: int, topic: str, number: int) -> Optional[Item]:
+        message = self._index.read(topic, number).content
+        stamp_s = float(self._times[topic][number])
+        scan = Scan(
+            stamp_s,
+            message.angle_min,
+            message.angle_increment,
+            message.range_min,
+            message.range_max,
+            np.asarray(message.ranges, np.float32),
+        )
+        map_from_base = self._tracks[robot].pose(stamp_s)
+        if map_from_base is None:
+            return None
+        return scan_item(robot, scan, map_from_base.compose(base_from_lidar))
+
+    def _local_plan(self, robot: int, topic: str, number: int) -> Item:
+        message = self._index.read(topic, number).content
+        places = [(pose.pose.position.x, pose.pose.position.y) for pose in message.poses]
+        points = np.array(places, np.float64).reshape(-1, 2)
+        frame = self._map_from(message.header.frame_id, robot, float(self._times[topic][number]))
+        return line_item("local_plan", robot, frame.transform_points(points))
+
+    def _track(self, robot: int, topic: str, number: int) -> Item:
+        markers = self._index.read(topic, number).content.markers
+        try:
+            frame, rows_of = rows_of_markers(markers)
+        except ValueError as error:
+            raise InputError([f"{topic}: message {number}: {error}"]) from error
+        at_s = float(self._times[topic][number])
+        return track_item(robot, rows_of, self._map_from(frame, robot, at_s))
+
+    def _costmap(self, topic: str) -> CostmapTrack:
+        if topic not in self._costmaps:
+            updates_s = self._times.get(f"{topic}_updates", np.zeros(0))
+            self._costmaps[topic] = CostmapTrack(self._index, topic, self._times[topic], updates_s)
+        return self._costmaps[topic]
+
+    def _costmap_item(
+        self, layer: str, robot: int, costmap: CostmapTrack, place: Tuple[int, int], time_s: float
+    ) -> Optional[Item]:
+        at = costmap.at(place, self._has_time)
+        if at is None:
+            return None
+        map_from_frame = self._map_from(at.frame, robot, time_s)
+        return costmap_item(layer, robot, at.spec, at.costs, map_from_frame)
+
+    def _cell(self, robot: int, time_s: float) -> Optional[Item]:
+        scene = self._trace.scene
+        if scene is None:
+            return None
+        positions = np.array([track.body(time_s)[:2] for track in self._tracks])
+        radius_m = self._trace.robot_radius_m + _MARGIN_M
+        return next(iter(cell_items(scene, positions, radius_m, [robot])), None)
+
+    def _map_from(self, frame: str, robot: int, time_s: float) -> Pose2D:
+        """Return the pose of a frame in ``map``; all but the odometry's are ``map``."""
+        frames = self._tracks[robot].robot.odom_frames
+        if not frames or not frame.lstrip("/").startswith("odom"):
+            return Pose2D(0.0, 0.0)
+        number = bisect.bisect_right([at_s for at_s, _ in frames], time_s) - 1
+        return frames[max(number, 0)][1]
+
+    def _topics_by_layer(self) -> Dict[Tuple[str, int], str]:
+        topics: Dict[Tuple[str, int], str] = {}
+        for topic, kind in self._index.kinds.items():
+            for layer, (pattern, expected) in _LAYERS.items():
+                match = re.fullmatch(pattern, topic)
+                if match and kind == expected and int(match.group(1)) in self._rows:
+                    topics[layer, self._rows[int(match.group(1))]] = topic
+        return topics
+
+
+def _is_wanted(topic: str, kind: str) -> bool:
+    if topic == OBSTACLES_TOPIC:
+        return kind == "visualization_msgs/MarkerArray"
+    if re.fullmatch(_UPDATES, topic):
+        return kind == "map_msgs/OccupancyGridUpdate"
+    return any(
+        kind == expected and re.fullmatch(pattern, topic) is not None
+        for pattern, expected in _LAYERS.values()
+    )

@@ -1,0 +1,198 @@
+"""One robot of a recorded flight at any time."""
+
+from __future__ import annotations
+
+import bisect
+import math
+from dataclasses import dataclass
+from typing import Any, Dict, List, Optional, Sequence, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.geometry import Pose2D, Pose3D
+from quad_nav.mission.goal import Goal
+from quad_nav.peers.right_of_way import Yield, YieldDecision
+from quad_nav.recording.trace import GoalTrace, RobotTrace
+from quad_nav.topics.right_of_way import LIMITED, MAKES_ROOM, WAITS, RightOfWay
+from quad_web.view import rows
+from quad_web.view.items import TRAIL_POINTS, TRAIL_SPACING_M, UNKNOWN_BODY
+
+_DEFAULT_RECOVERIES = 4  # of move_base
+LOST_AFTER_S = 1.0
+"""A robot without a pose for so long is lost: recorded time has no delays, and over longer gaps
+poses are not interpolated."""
+
+
+@dataclass(frozen=True)
+class RecordedEvent:
+    """An entry of the log of events, see ``view.state.Event``."""
+
+    time_s: float
+    level: str
+    robot: Optional[int]
+    text: str
+
+
+class RobotTrack:
+    """One robot's trace at any time.
+
+    Attributes:
+        robot: The trace.
+        goals: The goals of the mission.
+    """
+
+    def __init__(self, robot: RobotTrace) -> None:
+        """Look up a trace."""
+        self.robot = robot
+        self.goals = robot.mission or _flown_goals(robot.goals)
+        self._state_times_s = [time_s for time_s, _ in robot.states]
+        self._plan_times_s = [time_s for time_s, _ in robot.plans]
+        self._right_times_s = [time_s for time_s, _ in robot.rights_of_way]
+        self._sent_s = [goal.sent_s for goal in robot.goals]
+        self._spaced = _spaced(robot.positions_m[:, :2])
+
+    def body(self, time_s: float) -> NDArray[np.float64]:
+        """Return the row of ``poses_item`` at a time, float64[13], between two samples."""
+        robot = self.robot
+        after = int(np.searchsorted(robot.times_s, time_s, side="right"))
+        if after == 0 and time_s < robot.times_s[0]:
+            return np.array(UNKNOWN_BODY)
+        k, end = after - 1, min(after, len(robot.times_s) - 1)
+        span_s = robot.times_s[end] - robot.times_s[k]
+        part = (time_s - robot.times_s[k]) / span_s if 0.0 < span_s <= LOST_AFTER_S else 0.0
+        first, last = robot.quaternions[k], robot.quaternions[end]
+        last = last if float(first @ last) >= 0.0 else -last
+        quaternion = (1.0 - part) * first + part * last
+        quaternion /= math.sqrt(float(quaternion @ quaternion))
+        position = (1.0 - part) * robot.positions_m[k] + part * robot.positions_m[end]
+        vx_mps, vy_mps, turn_radps = robot.velocities[k].tolist()
+        yaw_rad = Pose3D(0.0, 0.0, 0.0, tuple(quaternion.tolist())).yaw_rad
+        vx_mps, vy_mps = Pose2D(0.0, 0.0, yaw_rad).rotate(vx_mps, vy_mps)
+        velocities = (vx_mps, vy_mps, 0.0, 0.0, 0.0, turn_radps)
+        return np.concatenate((position, quaternion, velocities))
+
+    def pose(self, time_s: float) -> Optional[Pose3D]:
+        """Return the pose in ``map`` at a time, None before the first one."""
+        x_m, y_m, z_m, *quaternion = self.body(time_s)[:7].tolist()
+        return None if math.isnan(x_m) else Pose3D(x_m, y_m, z_m, tuple(quaternion))
+
+    def age_s(self, time_s: float) -> float:
+        """Return the age of the last pose; 0 before the first one."""
+        times_s = self.robot.times_s
+        number = int(np.searchsorted(times_s, time_s, side="right")) - 1
+        return max(0.0, time_s - float(times_s[max(number, 0)]))
+
+    def trail_end(self, time_s: float) -> int:
+        """Return how many points of the spaced path there are up to a time."""
+        end = int(np.searchsorted(self.robot.times_s, time_s, side="right"))
+        return int(np.searchsorted(self._spaced, end))
+
+    def trail(self, end: int) -> NDArray[np.float64]:
+        """Return the points before ``trail_end``, float64[k, 2]."""
+        return self.robot.positions_m[self._spaced[max(0, end - TRAIL_POINTS) : end], :2]
+
+    def leg(self, time_s: float) -> Optional[GoalTrace]:
+        """Return the goal that was sent last."""
+        number = bisect.bisect_right(self._sent_s, time_s) - 1
+        return self.robot.goals[number] if number >= 0 else None
+
+    @staticmethod
+    def is_active(leg: GoalTrace, time_s: float) -> bool:
+        """Return whether a goal that was sent has not ended at a time."""
+        return leg.ended_s is None or leg.ended_s > time_s
+
+    def goal_rows(self, row: int, time_s: float) -> List[Dict[str, Any]]:
+        """Return the rows of the item ``goals``."""
+        leg = self.leg(time_s)
+        if leg is None:
+            return rows.goal_rows(row, self.goals, 0, False)
+        is_active = self.is_active(leg, time_s)
+        failed = {
+            one.index
+            for one in self.robot.goals
+            if one.lap == leg.lap and not one.reached and not self.is_active(one, time_s)
+        }
+        index = leg.index if is_active else leg.index + 1
+        return rows.goal_rows(row, self.goals, index, is_active, failed)
+
+    def plan_number(self, time_s: float) -> Optional[int]:
+        """Return the number of the plan that is followed."""
+        number = bisect.bisect_right(self._plan_times_s, time_s) - 1
+        leg = self.leg(time_s)
+        has_ended = leg is not None and not self.is_active(leg, time_s)
+        return None if number < 0 or has_ended else number
+
+    def state(self, time_s: float) -> str:
+        """Return the navigator's state; what the goals tell if the recording has no states."""
+        number = bisect.bisect_right(self._state_times_s, time_s) - 1
+        if number >= 0:
+            return self.robot.states[number][1].value
+        leg = self.leg(time_s)
+        return "idle" if leg is None or not self.is_active(leg, time_s) else "controlling"
+
+    def right_of_way(self, time_s: float) -> RightOfWay:
+        """Return what the robot does for its peers."""
+        number = bisect.bisect_right(self._right_times_s, time_s) - 1
+        return self.robot.rights_of_way[number][1] if number >= 0 else RightOfWay()
+
+    def recoveries(self, time_s: float) -> Tuple[int, int]:
+        """Return how many recovery behaviours began for the present goal, and how many exist."""
+        leg = self.leg(time_s)
+        since_s = -math.inf if leg is None else leg.sent_s
+        begun = sum(since_s <= at_s <= time_s for at_s, _ in self.robot.recoveries)
+        parameters = self.robot.parameters
+        listed = parameters.get("recovery_behaviors")
+        usual = _DEFAULT_RECOVERIES if parameters else 0
+        return begun, max(begun, len(listed) if isinstance(listed, list) else usual)
+
+
+def _spaced(positions_m: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the indices of positions float64[n, 2] that are ``TRAIL_SPACING_M`` apart."""
+    kept: List[int] = []
+    x0_m, y0_m = math.inf, math.inf
+    for number, (x_m, y_m) in enumerate(positions_m.tolist()):
+        if not math.hypot(x_m - x0_m, y_m - y0_m) < TRAIL_SPACING_M:
+            kept.append(number)
+            x0_m, y0_m = x_m, y_m
+    return np.array(kept, np.int64)
+
+
+def _flown_goals(flown: Sequence[GoalTrace]) -> Tuple[Goal, ...]:
+    """Return the goals that were sent, where the recording does not have those of the file."""
+    known = {goal.index: Goal(goal.pose.x_m, goal.pose.y_m) for goal in flown}
+    return (
+        tuple(known[k] for k in range(len(known))) if set(known) == set(range(len(known))) else ()
+    )
+
+
+def decision_of(right: RightOfWay) -> Optional[YieldDecision]:
+    """Return the decision to yield of a right of way; None if the robot does not yield."""
+    if right.kind not in (WAITS, MAKES_ROOM):
+        return None
+    action = Yield.WAIT if right.kind == WAITS else Yield.MAKE_ROOM
+    return YieldDecision(right.peer, action, right.hold_m and Pose2D(*right.hold_m))
+
+
+def events_of(robots: Sequence[RobotTrace]) -> List[RecordedEvent]:
+    """Return what happened to goals, recoveries and peers."""
+    events: List[RecordedEvent] = []
+    for row, robot in enumerate(robots):
+        for goal in robot.goals:
+            place = f"({goal.pose.x_m:.2f}, {goal.pose.y_m:.2f})"
+            events.append(
+                RecordedEvent(goal.sent_s, "info", row, f"goal {goal.index + 1}: sent {place}")
+            )
+            if goal.ended_s is not None:
+                text = f"reached after {goal.ended_s - goal.sent_s:.1f} s"
+                level = "info" if goal.reached else "warning"
+                text = text if goal.reached else f"skipped: {goal.reason}"
+                events.append(
+                    RecordedEvent(goal.ended_s, level, row, f"goal {goal.index + 1}: {text}")
+                )
+        for at_s, name in robot.recoveries:
+            events.append(RecordedEvent(at_s, "warning", row, f"recovery {name}"))
+        for at_s, right in robot.rights_of_way:
+            if right.kind not in ("", LIMITED):
+                events.append(RecordedEvent(at_s, "info", row, right.text))
+    return events

@@ -1,0 +1,289 @@
+"""Play a recorded flight on a page: play, pause, seek, and a speed."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+from typing import Callable, Dict, FrozenSet, Hashable, List, Optional
+
+import numpy as np
+
+from quad_nav.errors import InputError
+from quad_web.replay.recorded_flight import RecordedFlight
+from quad_web.view.actions import Actions, Answer
+from quad_web.view.rows import flight_item
+from quad_web.view.state import LAYERS, OF_ONE_ROBOT, FleetState, Item, robots_by_layer
+
+PERIOD_S = 0.1
+FASTEST = 50.0
+"""Rate of "as fast as it goes", recorded seconds per second: nothing faster is readable."""
+_HISTORY_S, _HISTORY_PERIOD_S = 60.0, 1.0
+_SHOW_WITHIN_S = 0.08
+_PROGRESS_PERIOD_S = 0.25
+SLOWEST, MAX_RATE = 0.01, 1000.0
+
+
+class Replay(Actions):
+    """Puts a recorded flight into a state, as time passes.
+
+    It plays from when the first page is open. ``run`` is for a thread of its own.
+    """
+
+    available = frozenset({"start", "pause", "reset", "set_rate", "seek"})
+
+    def __init__(
+        self,
+        flight: RecordedFlight,
+        state: FleetState,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Stand at the start of a flight.
+
+        Args:
+            flight: The flight.
+            state: What pages show.
+            clock: Wall clock.
+        """
+        self._flight, self._state, self._clock = flight, state, clock
+        self._changed = threading.Condition()
+        self._time_s = flight.start_s
+        self._rate, self._is_playing = 1.0, True
+        self._has_jumped = True
+        self._is_closed = False
+        self._last_wall_s: Optional[float] = None
+        self._shown: Dict[str, Hashable] = {}  # item -> what identifies its state
+        self._told = 0  # events
+        self._subject: object = None
+        self._lacks_history = False
+        state.put_all([*flight.static_items, self._flight_item()])
+
+    # -- actions, in the pages' threads --------------------------------------------------
+
+    def start(self) -> Answer:
+        """Play; from the start if the recording has ended."""
+        with self._changed:
+            if self._time_s >= self._flight.end_s:
+                self._jump(self._flight.start_s)
+            self._is_playing = True
+            self._changed.notify()
+        return Answer(True, "playing")
+
+    def pause(self) -> Answer:
+        """Stand still."""
+        with self._changed:
+            self._is_playing = False
+            self._changed.notify()
+            return Answer(True, f"stands at {self._time_s:.1f} s")
+
+    def reset(self) -> Answer:
+        """Go to the start of the recording."""
+        return self.seek(self._flight.start_s)
+
+    def set_rate(self, rate: float) -> Answer:
+        """Set seconds of the recording per second; 0 is as fast as it goes."""
+        if rate != 0.0 and not SLOWEST <= rate <= MAX_RATE:
+            return Answer(False, f"rate: {rate:g}; expected 0, or {SLOWEST:g} to {MAX_RATE:g}")
+        with self._changed:
+            self._rate = rate
+            self._changed.notify()
+        return Answer(True, f"rate: {rate:g}" if rate else f"rate: {FASTEST:g}, the fastest")
+
+    def seek(self, time_s: float) -> Answer:
+        """Go to a time of the flight; it plays on if it did."""
+        if not time_s == time_s:
+            return Answer(False, f"time: {time_s}; expected seconds")
+        with self._changed:
+            self._jump(min(max(time_s, self._flight.start_s), self._flight.end_s))
+            self._changed.notify()
+            return Answer(True, f"at {self._time_s:.1f} s")
+
+    def _jump(self, time_s: float) -> None:
+        self._time_s = time_s
+        self._has_jumped = True
+
+    # -- the player's thread -------------------------------------------------------------
+
+    def run(self) -> None:
+        """Play until ``close``.
+
+        Raises:
+            InputError: The file is damaged, or cannot be read any more.
+        """
+        while not self._is_closed:
+            self.step()
+            with self._changed:
+                if not self._has_jumped and not self._is_closed:
+                    self._changed.wait(PERIOD_S)
+
+    def close(self) -> None:
+        """End ``run``."""
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify()
+
+    def step(self) -> None:
+        """Let time pass, and show what is wanted then."""
+        wanted = self._state.wanted()
+        with self._changed:
+            time_s, has_jumped = self._pass_time(bool(wanted)), self._has_jumped
+            self._has_jumped = False
+            subject = (time_s, wanted, self._is_playing, self._rate)
+            flight_item = self._flight_item()
+        if subject == self._subject or not (wanted or has_jumped):
+            return
+        self._subject = None if has_jumped else subject
+        self._tell_events(time_s)
+        robots_of = robots_by_layer(wanted, range(len(self._flight.names)))
+        fast = {layer: robots_of[layer] for layer in LAYERS if layer not in OF_ONE_ROBOT}
+        slow = {layer: robots_of[layer] for layer in OF_ONE_ROBOT}
+        self._show([flight_item, *self._flight.present_items(time_s)], fast, time_s)
+        self._show([], slow, time_s)
+        if self._lacks_history and not has_jumped:  # not while somebody drags the bar
+            self._state.put_all(self._history(time_s))
+        self._lacks_history = has_jumped
+
+    def _pass_time(self, is_seen: bool) -> float:
+        """Return the time after what has passed since the last call."""
+        wall_s = self._clock()
+        if self._last_wall_s is not None and self._is_playing and is_seen and not self._has_jumped:
+            rate = self._rate or FASTEST
+            self._time_s += (wall_s - self._last_wall_s) * rate
+        self._last_wall_s = wall_s
+        if self._time_s >= self._flight.end_s:
+            self._time_s, self._is_playing = self._flight.end_s, False
+        return self._time_s
+
+    def _show(self, items: List[Item], robots_of: Dict[str, FrozenSet[int]], time_s: float) -> None:
+        """Put items, and the layers that have changed."""
+        end_s = self._clock() + _SHOW_WITHIN_S
+        parts = self._flight.parts(time_s, robots_of, lambda: self._clock() < end_s)
+        here = {key for key in self._shown if key.partition("/")[0] in robots_of}
+        removed = [key for key in here if key not in parts]
+        for key, (identity, make) in parts.items():
+            if self._shown.get(key) != identity:
+                item = make()
+                if item is None:  # also a costmap for which there was no time
+                    removed.append(key)
+                    self._subject = None
+                else:
+                    items.append(item)
+                    self._shown[key] = identity
+        for key in removed:
+            self._shown.pop(key, None)
+        if items or removed:
+            self._state.put_all(items, tuple(removed))
+
+    def _history(self, time_s: float) -> List[Item]:
+        """Return the samples of the last minute, the last one with all of them for charts."""
+        first_s = max(self._flight.start_s, time_s - _HISTORY_S)
+        times_s = np.arange(time_s, first_s, -_HISTORY_PERIOD_S)[::-1]
+        if not len(times_s):
+            return []
+        samples = [self._flight.sample(float(at_s)) for at_s in times_s]
+        last, values = samples.pop(), [sample.arrays["values"] for sample in samples]
+        history = np.array(values, np.float32).reshape(-1, len(self._flight.names), 4)
+        arrays = {**last.arrays, "times": times_s[:-1], "history": history}
+        return [*samples, Item("samples", last.data, arrays)]
+
+    def _tell_events(self, time_s: float) -> None:
+        """Append the events up to a time to the log, each once."""
+        events = self._flight.events
+        while self._told < len(events) and events[self._told].time_s <= time_s:
+            event = events[self._told]
+            self._state.add_event(event.time_s, event.text, event.level, event.robot)
+            self._told += 1
+
+    def _flight_item(self) -> Item:
+        flight = self._flight
+        has_ended = self._time_s >= flight.end_s
+        state = "ended" if has_ended else "running" if self._is_playing else "paused"
+        rate = (self._rate or FASTEST) if state == "running" else None
+        return flight_item(
+            "replay",
+            flight.title,
+            state,
+            self._time_s,
+            rate=rate,
+            wanted_rate=self._rate,
+            duration_s=flight.end_s,
+            reason=flight.end_reason if has_ended else "",
+        )
+
+
+class OpenedReplay(Actions):
+    """A replay whose file is read while pages are open: until then they show how far it is.
+
+    Attributes:
+        is_read: Set when the file is read, or cannot be read.
+        faults: Why it cannot be read, or not any more.
+    """
+
+    available = Replay.available
+    _refusal = "the recording is still being read"
+
+    def __init__(self, path: Path, state: FleetState) -> None:
+        """Read nothing yet.
+
+        Args:
+            path: The recording.
+            state: What pages show.
+        """
+        self._path, self._state = path, state
+        self.is_read = threading.Event()
+        self.faults: List[str] = []
+        self._player: Optional[Replay] = None
+        self._next_told_s = -float("inf")
+        self._progress(0.0)
+
+    def run(self) -> None:
+        """Read the file and play until ``close``, or until there are faults."""
+        try:
+            player = self.read()
+            self.is_read.set()
+            player.run()
+        except InputError as error:
+            self.faults = error.problems
+        finally:
+            self.is_read.set()
+
+    def read(self) -> Replay:
+        """Read the file, and return what plays it.
+
+        Raises:
+            InputError: The file cannot be read as a flight.
+        """
+        self._player = Replay(RecordedFlight(self._path, self._progress), self._state)
+        return self._player
+
+    def _progress(self, share: float) -> None:
+        now_s = time.monotonic()
+        if now_s >= self._next_told_s:
+            self._next_told_s = now_s + _PROGRESS_PERIOD_S
+            title = f"reading {self._path.name}, {share:.0%}"
+            self._state.put_all([flight_item("replay", title, "starting", 0.0)])
+
+    def start(self) -> Answer:
+        """Play."""
+        return self._player.start() if self._player else self._refused("start")
+
+    def pause(self) -> Answer:
+        """Stand still."""
+        return self._player.pause() if self._player else self._refused("pause")
+
+    def reset(self) -> Answer:
+        """Go to the start of the recording."""
+        return self._player.reset() if self._player else self._refused("reset")
+
+    def set_rate(self, rate: float) -> Answer:
+        """Set seconds of the recording per second; 0 is as fast as it goes."""
+        return self._player.set_rate(rate) if self._player else self._refused("set_rate")
+
+    def seek(self, time_s: float) -> Answer:
+        """Go to a time of the flight."""
+        return self._player.seek(time_s) if self._player else self._refused("seek")
+
+    def close(self) -> None:
+        """End ``Replay.run``."""
+        if self._player:
+            self._player.close()

@@ -1,0 +1,255 @@
+"""Layers of each robot that a page can switch on: scan, plans, costmaps and tracks."""
+
+from __future__ import annotations
+
+import time
+from typing import Any, Callable, Dict, FrozenSet, List, Mapping, Optional, Protocol
+
+import numpy as np
+from map_msgs.msg import OccupancyGridUpdate
+from nav_msgs.msg import OccupancyGrid, Path
+from numpy.typing import NDArray
+from rospy.numpy_msg import numpy_msg
+from sensor_msgs.msg import LaserScan
+from visualization_msgs.msg import MarkerArray
+
+from quad_nav.config.plugins import plugin_name
+from quad_nav.grid import GridSpec
+from quad_nav.ros.common.conversions import ScanMessage, scan_from_message
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
+from quad_nav.ros.common.packed_messages import read_path
+from quad_web.ros.frames import Frames
+from quad_web.ros.intake import Newest, Topic, decoded, raw_type
+from quad_web.ros.poses import MAP, Bodies
+from quad_nav.topics.tracked_obstacles import MARKERS_TOPIC, rows_of_markers
+from quad_nav.topics.validation import grid_problem, path_problem, scan_problem
+from quad_web.view.items import costmap_item, line_item, scan_item, track_item
+from quad_web.view.state import OF_ONE_ROBOT, Item
+
+COSTMAP_PERIOD_S = 0.2  # wall time between two items of a costmap
+_PLANNERS = {"plan": "base_global_planner", "local_plan": "base_local_planner"}
+_TOPICS = ("scan", "plan", "local_plan", "track", *OF_ONE_ROBOT)
+_GridMessage, _UpdateMessage = numpy_msg(OccupancyGrid), numpy_msg(OccupancyGridUpdate)
+
+Tree = Mapping[str, Any]
+
+
+class Intake(Protocol):
+    """Receives one layer of one robot."""
+
+    def topics(self) -> Dict[str, Topic]:
+        """Return the topics to subscribe to."""
+
+    def item(self) -> Optional[Item]:
+        """Return the item if it is new; raises `ValueError` for a message that is not valid."""
+
+
+class ScanIntake:
+    """Scans of a robot's LIDAR."""
+
+    def __init__(self, robot: int, bodies: Bodies, frames: Frames) -> None:
+        """Receive `/scan{i}`."""
+        self._robot, self._bodies, self._frames = robot, bodies, frames
+        self._newest = Newest(f"/scan{robot}", LaserScan)
+
+    def topics(self) -> Dict[str, Topic]:
+        """Return the topic."""
+        return {f"/scan{self._robot}": self._newest.topic}
+
+    def item(self) -> Optional[Item]:
+        """Return the newest scan's hit points where the robot was at its time."""
+        data = self._newest.take_bytes()
+        if data is None:
+            return None
+        message = decoded(ScanMessage, data)
+        scan = scan_from_message(message)
+        problem = scan_problem(scan)
+        if problem:
+            raise ValueError(problem)
+        map_from_base = self._bodies.at(self._robot, scan.stamp_s)
+        base_from_lidar = self._frames.find(f"base_link{self._robot}", message.header.frame_id)
+        if map_from_base is None or base_from_lidar is None:
+            return None
+        return scan_item(self._robot, scan, map_from_base.compose(base_from_lidar))
+
+
+class PlanIntake:
+    """Global or local plans of a robot."""
+
+    def __init__(self, layer: str, robot: int, planner: str, frames: Frames) -> None:
+        """Receive the plans of a planner, named as its topic's namespace."""
+        self._layer, self._robot, self._frames = layer, robot, frames
+        self._name = f"/move_base{robot}/{planner}/{layer}"
+        self._newest = Newest(self._name, Path)
+
+    def topics(self) -> Dict[str, Topic]:
+        """Return the topic."""
+        return {self._name: self._newest.topic}
+
+    def item(self) -> Optional[Item]:
+        """Return the newest plan."""
+        data = self._newest.take_bytes()
+        if data is None:
+            return None
+        frame, points = read_path(data)
+        problem = path_problem(points)
+        if problem:
+            raise ValueError(problem)
+        map_from_plan = self._frames.find(MAP, frame)
+        if map_from_plan is None:
+            return None
+        return line_item(self._layer, self._robot, map_from_plan.to_2d().transform_points(points))
+
+
+class TrackIntake:
+    """Tracks and suspects of a robot."""
+
+    def __init__(self, robot: int, frames: Frames) -> None:
+        """Receive the markers of tracks and suspects."""
+        self._robot, self._frames = robot, frames
+        self._name = f"/move_base{robot}/{MARKERS_TOPIC}"
+        self._newest = Newest(self._name, MarkerArray)
+
+    def topics(self) -> Dict[str, Topic]:
+        """Return the topic."""
+        return {self._name: self._newest.topic}
+
+    def item(self) -> Optional[Item]:
+        """Return the newest tracks; none once the last one has ended."""
+        message = self._newest.take()
+        if message is None:
+            return None
+        frame, rows = rows_of_markers(message.markers)
+        map_from_frame = self._frames.find(MAP, frame or MAP)
+        if map_from_frame is None:
+            return None
+        return track_item(self._robot, rows, map_from_frame.to_2d())
+
+
+class CostmapIntake:
+    """A costmap of a robot, from its grid and the updates of parts of it."""
+
+    def __init__(self, layer: str, robot: int, frames: Frames) -> None:
+        """Receive the grid and its updates."""
+        self._layer, self._robot, self._frames = layer, robot, frames
+        self._name = f"/move_base{robot}/{layer}/costmap"
+        self._spec: Optional[GridSpec] = None
+        self._frame = MAP
+        self._costs: NDArray[np.int8] = np.zeros((0, 0), np.int8)
+        self._has_changed, self._next_s = False, 0.0
+        self._warnings = ThrottledWarnings()
+
+    def topics(self) -> Dict[str, Topic]:
+        """Return both topics."""
+        return {
+            self._name: Topic(raw_type(OccupancyGrid), self._on_grid),
+            f"{self._name}_updates": Topic(raw_type(OccupancyGridUpdate), self._on_update),
+        }
+
+    def _on_grid(self, raw: Any) -> None:
+        try:
+            message = decoded(_GridMessage, raw.data_bytes)
+            info, corner = message.info, message.info.origin.position
+            problem = grid_problem(
+                info.width, info.height, info.resolution, len(message.data), (corner.x, corner.y)
+            )
+            if problem:
+                raise ValueError(problem)
+        except ValueError as error:
+            self._warnings.warn(f"web: {self._name}: grid dropped: {error}", kind="grid")
+            return
+        spec = GridSpec(info.width, info.height, info.resolution, corner.x, corner.y)
+        self._costs = np.array(message.data, np.int8).reshape(spec.shape)
+        self._spec, self._frame, self._has_changed = spec, message.header.frame_id, True
+
+    def _on_update(self, raw: Any) -> None:
+        try:
+            message = decoded(_UpdateMessage, raw.data_bytes)
+            x0, y0, shape = message.x, message.y, (message.height, message.width)
+            part = self._costs[max(y0, 0) : y0 + shape[0], max(x0, 0) : x0 + shape[1]]
+            if part.shape != shape or len(message.data) != part.size:
+                raise ValueError(f"{shape[1]} x {shape[0]} cells at ({x0}, {y0})")
+        except ValueError as error:
+            if self._spec is not None:  # before the grid there is nothing to update
+                self._warnings.warn(f"web: {self._name}: update dropped: {error}", kind="update")
+            return
+        part[:] = np.asarray(message.data, np.int8).reshape(shape)
+        self._has_changed = True
+
+    def item(self) -> Optional[Item]:
+        """Return the costmap if it has changed and was not returned a short time ago."""
+        if self._spec is None or not self._has_changed or time.monotonic() < self._next_s:
+            return None
+        map_from_frame = self._frames.find(MAP, self._frame)
+        if map_from_frame is None:
+            return None
+        self._has_changed, self._next_s = False, time.monotonic() + COSTMAP_PERIOD_S
+        return costmap_item(
+            self._layer, self._robot, self._spec, self._costs.copy(), map_from_frame.to_2d()
+        )
+
+
+class Layers:
+    """The layers that clients show, of all robots."""
+
+    def __init__(
+        self, robots: int, bodies: Bodies, frames: Frames, tree_of: Callable[[int], Tree]
+    ) -> None:
+        """Start without clients.
+
+        Args:
+            robots: Number of robots.
+            bodies: Their poses.
+            frames: Transforms.
+            tree_of: Returns the parameters of a robot's navigator, {} if they are unknown.
+        """
+        self._robots, self._bodies, self._frames = robots, bodies, frames
+        self._tree_of = tree_of
+        self._intakes: Dict[str, Intake] = {}
+        self._warnings = ThrottledWarnings()
+
+    def topics(self, shown: Mapping[str, FrozenSet[int]]) -> Dict[str, Topic]:
+        """Return the topics to subscribe to.
+
+        Args:
+            shown: Robots of which clients show a layer, by layer.
+        """
+        wanted = [(layer, robot) for layer in _TOPICS for robot in sorted(shown[layer])]
+        intakes = {}
+        for layer, robot in wanted:
+            key = f"{layer}/{robot}"
+            intake = self._intakes.get(key) or self._new(layer, robot)
+            if intake is not None:
+                intakes[key] = intake
+        self._intakes = intakes
+        return {name: topic for one in intakes.values() for name, topic in one.topics().items()}
+
+    def _new(self, layer: str, robot: int) -> Optional[Intake]:
+        if layer == "scan":
+            return ScanIntake(robot, self._bodies, self._frames)
+        if layer in OF_ONE_ROBOT:
+            return CostmapIntake(layer, robot, self._frames)
+        if layer == "track":
+            return TrackIntake(robot, self._frames)
+        planner = self._tree_of(robot).get(_PLANNERS[layer])
+        if not isinstance(planner, str):
+            return None
+        return PlanIntake(layer, robot, plugin_name(planner), self._frames)
+
+    def items(self) -> List[Item]:
+        """Return the items that are new."""
+        items = []
+        for key, intake in self._intakes.items():
+            try:
+                item = intake.item()
+            except ValueError as error:
+                self._warnings.warn(f"web: {key}: message dropped: {error}", kind=key)
+                continue
+            if item is not None:
+                items.append(item)
+        return items
+
+    @property
+    def keys(self) -> FrozenSet[str]:
+        """Keys of the items that may be shown."""
+        return frozenset(self._intakes)

@@ -1,0 +1,264 @@
+"""What the nodes say about a flight: scene and mission, goals, contacts, yields and their log."""
+
+from __future__ import annotations
+
+import re
+import threading
+import time
+from typing import Any, Dict, List, Mapping, Optional, Set, Tuple
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from move_base_msgs.msg import RecoveryStatus
+from rosgraph_msgs.msg import Log
+from std_msgs.msg import String, Time
+from visualization_msgs.msg import Marker, MarkerArray
+
+from quad_nav.errors import InputError, excerpt
+from quad_nav.files.values import is_number, is_whole
+from quad_nav.geometry import Pose2D, yaw_from_quaternion
+from quad_nav.peers.right_of_way import Yield, YieldDecision
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
+from quad_web.ros.intake import Newest, Topic
+from quad_nav.sim.contacts import Contact
+from quad_nav.sim.scene import BODY_RADIUS_M, Scene
+from quad_nav.sim.scene_file import scene_from_document
+from quad_nav.topics.flight_info import (
+    CONTACT_STATUS,
+    EVENTS_TOPIC,
+    FLIGHT_TOPIC,
+    RESET_TOPIC,
+    contact_from_values,
+    from_text,
+)
+from quad_nav.topics.right_of_way import (
+    LIMITED,
+    MAKES_ROOM,
+    RIGHT_OF_WAY_STATUS,
+    WAITS,
+    RightOfWay,
+    right_of_way_from_values,
+)
+from quad_nav.topics.validation import MAX_MAGNITUDE
+from quad_web.view.state import FleetState
+
+MAX_CONTACTS, MAX_GOALS, MAX_TEXT = 500, 20_000, 500
+_LEVELS = {Log.WARN: "warning", Log.ERROR: "error", Log.FATAL: "error"}
+_OUR_NODES = re.compile(r"/(simulator|sequencer|move_base\d+|fleet\d*|goal_router|web)")
+_ROBOT = re.compile(r"quad(\d{1,4})\b")
+_GOAL = re.compile(r"goal(\d{1,4})(_yaw)?")
+_CONTACT = "CONTACT with"  # the sequencer repeats what the simulator has logged
+_ACTIVE_ALPHA, _REACHED_ALPHA = 0.95, 0.4  # of the spheres of goals, see topics.markers
+_ACTIONS = {WAITS: Yield.WAIT, MAKES_ROOM: Yield.MAKE_ROOM}
+
+
+class FlightReports:
+    """Receives what the nodes say; its attributes are what they have said so far.
+
+    Attributes:
+        scene: The scene, None before the simulator has published it.
+        radius_m: Radius of a robot's hull.
+        trees: Parameters of each robot's navigator as the mission has loaded them.
+        contacts: The last contacts.
+        recoveries: Number of the last recovery behaviour of each robot's goal, and of all.
+        sent_s: Wall time, monotonic, at which each robot's sequencer has sent its last goal.
+        version: Counts changes of scene, radius and trees; `contacts_version` those of contacts.
+        resets: Counts resets of the simulation.
+    """
+
+    def __init__(self, robots: int, state: FleetState) -> None:
+        """Start without reports.
+
+        Args:
+            robots: Number of robots.
+            state: Its log of events gets what the nodes log.
+        """
+        self.scene: Optional[Scene] = None
+        self.radius_m = BODY_RADIUS_M
+        self.trees: Dict[int, Mapping[str, Any]] = {}
+        self.contacts: List[Contact] = []
+        self.version = self.contacts_version = self.resets = 0
+        self._robots, self._state = robots, state
+        self._failed: Set[Tuple[int, int]] = set()
+        self._goals = Newest("/goals", MarkerArray)
+        self._rows: List[Dict[str, Any]] = []
+        self._right_of_way: Dict[int, RightOfWay] = {}
+        self.recoveries: Dict[int, Tuple[int, int]] = {}
+        self.sent_s: Dict[int, float] = {}
+        self._lock = threading.Lock()
+        self._warnings = ThrottledWarnings()
+
+    def topics(self, has_clients: bool) -> Dict[str, Topic]:
+        """Return the topics to subscribe to."""
+        topics = {
+            FLIGHT_TOPIC: Topic(String, self._on_flight),
+            EVENTS_TOPIC: Topic(String, self._on_event),
+            RESET_TOPIC: Topic(Time, self._on_reset),
+            "/simulation/contacts": Topic(DiagnosticStatus, self._on_contact),
+            "/rosout_agg": Topic(Log, self._on_log),
+        }
+        if not has_clients:
+            return topics
+        topics["/goals"] = self._goals.topic
+        for robot in range(self._robots):
+            node = f"/move_base{robot}"
+            topics[f"{node}/right_of_way"] = Topic(DiagnosticStatus, self._on_right_of_way)
+            topics[f"{node}/recovery_status"] = Topic(RecoveryStatus, self._on_recovery)
+        return topics
+
+    def forget_navigator(self, robot: int) -> None:
+        """Forget what a navigator has said that does not say anything any more."""
+        self._right_of_way.pop(robot, None)
+
+    # -- the flight ----------------------------------------------------------------------
+
+    def _on_flight(self, message: String) -> None:
+        """Merge the facts of a publisher; nothing that comes is trusted."""
+        info = from_text(message.data) or {}
+        try:
+            if "scene" in info:
+                document = info["scene"]
+                if isinstance(document, dict) and {"world", "map"} & set(document):
+                    raise InputError(["scene: refers to another file"])
+                self.scene = scene_from_document(document, f"{FLIGHT_TOPIC}: scene")
+        except InputError as error:
+            self._warnings.warn(f"web: {FLIGHT_TOPIC}: scene dropped: {error}", kind="scene")
+        radius_m: Any = info.get("robot_radius_m")
+        if is_number(radius_m) and 0.0 < radius_m <= MAX_MAGNITUDE:
+            self.radius_m = float(radius_m)
+        robots = info.get("robots")
+        for number, robot in enumerate(robots if isinstance(robots, list) else ()):
+            tree = robot.get("parameters") if isinstance(robot, dict) else None
+            if isinstance(tree, dict) and number < self._robots:
+                self.trees[number] = tree
+        self.version += 1
+
+    def _on_reset(self, _: Time) -> None:
+        self.resets += 1
+        self._failed.clear()
+
+    def _on_event(self, message: String) -> None:
+        event = from_text(message.data) or {}
+        robot: Any = event.get("robot")
+        goal: Any = event.get("goal")
+        if is_whole(robot) and is_whole(goal) and 0 <= robot < self._robots and goal < MAX_GOALS:
+            is_failure = event.get("event") == "ended" and event.get("reached") is not True
+            (self._failed.add if is_failure else self._failed.discard)((robot, goal))
+            if event.get("event") == "sent":
+                self.recoveries.pop(robot, None)
+                self.sent_s[robot] = time.monotonic()
+
+    def _on_contact(self, message: DiagnosticStatus) -> None:
+        if message.name != CONTACT_STATUS:
+            return
+        values = {pair.key: pair.value for pair in message.values}
+        try:
+            contact = contact_from_values(message.hardware_id, values)
+        except ValueError as error:
+            self._warnings.warn(f"web: /simulation/contacts: message dropped: {error}", "contact")
+            return
+        with self._lock:
+            self.contacts = [*self.contacts[1 - MAX_CONTACTS :], contact]
+            self.contacts_version += 1
+        place = f"({contact.x_m:.2f}, {contact.y_m:.2f}) m"
+        text = excerpt(f"CONTACT: {contact} at {place}", MAX_TEXT)
+        self._state.add_event(contact.time_s, text, "error", self._robot_of(contact.robot))
+
+    def _on_log(self, message: Log) -> None:
+        level = _LEVELS.get(message.level, "info")
+        is_ours = _OUR_NODES.fullmatch(message.name) is not None
+        if message.level < Log.INFO or (level == "info" and not is_ours):
+            return
+        text = message.msg
+        if is_ours and (_CONTACT in text or " touches " in text):
+            return  # `_on_contact` has it
+        self._state.add_event(
+            message.header.stamp.to_sec(),
+            excerpt(" ".join(text.split()), MAX_TEXT),
+            level,
+            self._robot_of(text) if is_ours else None,
+        )
+
+    def _robot_of(self, text: str) -> Optional[int]:
+        found = _ROBOT.match(text)
+        robot = int(found[1]) if found else self._robots
+        return robot if robot < self._robots else None
+
+    # -- robots --------------------------------------------------------------------------
+
+    def _on_recovery(self, message: RecoveryStatus) -> None:
+        robot = _robot_of_topic(message)
+        if robot is not None:
+            count = max(0, message.current_recovery_number) + 1
+            self.recoveries[robot] = count, max(count, message.total_number_of_recoveries)
+
+    def _on_right_of_way(self, message: DiagnosticStatus) -> None:
+        robot = _robot_of_topic(message)
+        if robot is None or message.name != RIGHT_OF_WAY_STATUS:
+            return
+        try:
+            self._right_of_way[robot] = right_of_way_from_values(
+                message.message, {pair.key: pair.value for pair in message.values}
+            )
+        except ValueError as error:
+            topic = f"/move_base{robot}/right_of_way"
+            self._warnings.warn(f"web: {topic}: message dropped: {error}", kind="right of way")
+
+    def decision(self, robot: int) -> Optional[YieldDecision]:
+        """Return a robot's decision to yield, None if it does not yield."""
+        present = self._right_of_way.get(robot, RightOfWay())
+        if present.kind in ("", LIMITED):
+            return None
+        hold_m = present.hold_m
+        point = None if hold_m is None else Pose2D(*hold_m)
+        return YieldDecision(present.peer, _ACTIONS[present.kind], point)
+
+    def limited_by(self, robot: int) -> str:
+        """Return the name of the robot that limits a robot's command, "" if none does."""
+        return self._right_of_way.get(robot, RightOfWay()).limited_by
+
+    def goal_rows(self) -> List[Dict[str, Any]]:
+        """Return the rows of the item ``goals``, from the markers of the sequencer."""
+        try:
+            message = self._goals.take()
+        except ValueError as error:
+            self._warnings.warn(f"web: /goals: message dropped: {error}", kind="goals")
+            return self._rows
+        if message is not None:
+            self._rows = self._read_goals(message)
+        return [
+            {**row, "state": "failed"}
+            if row["state"] == "reached" and (row["robot"], row["index"]) in self._failed
+            else row
+            for row in self._rows
+        ]
+
+    def _read_goals(self, message: MarkerArray) -> List[Dict[str, Any]]:
+        yaws: Dict[Tuple[int, int], float] = {}
+        rows = []
+        for marker in message.markers[: 3 * MAX_GOALS]:
+            found = _GOAL.fullmatch(marker.ns)
+            if not found or int(found[1]) >= self._robots or marker.action != Marker.ADD:
+                continue
+            key, at, turn = (
+                (int(found[1]), marker.id),
+                marker.pose.position,
+                marker.pose.orientation,
+            )
+            if not (abs(at.x) <= MAX_MAGNITUDE and abs(at.y) <= MAX_MAGNITUDE):
+                continue
+            if found[2]:
+                yaws[key] = yaw_from_quaternion((turn.x, turn.y, turn.z, turn.w))
+                continue
+            alpha = marker.color.a
+            state = "active" if alpha > _ACTIVE_ALPHA else "pending"
+            if alpha < _REACHED_ALPHA:
+                state = "reached"
+            rows.append({"robot": key[0], "index": key[1], "x": at.x, "y": at.y, "state": state})
+        return [{**row, "yaw": yaws.get((row["robot"], row["index"]))} for row in rows]
+
+
+def _robot_of_topic(message: Any) -> Optional[int]:
+    """Return the number of the robot whose topic a message came from."""
+    topic = message._connection_header.get("topic", "")
+    found = re.match(r"/move_base(\d{1,4})/", topic)
+    return int(found[1]) if found else None

@@ -1,0 +1,305 @@
+"""Put what clients want to see of a flight of ROS nodes into the state of their pages."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from typing import Any, Dict, FrozenSet, List, Mapping, Optional, Sequence, Set, Tuple
+
+import rospy
+
+from quad_nav.geometry import Pose2D
+from quad_nav.ros.simulator.topics import FASTEST_RATE
+from quad_web.ros.frames import Frames
+from quad_web.ros.health import LOST_AFTER_S, FleetHealth
+from quad_web.ros.intake import Subscriptions
+from quad_web.ros.layers import Layers
+from quad_web.ros.obstacles import Obstacles
+from quad_web.ros.parameters import NavigatorTrees
+from quad_web.ros.poses import Bodies
+from quad_web.ros.reports import FlightReports
+from quad_nav.scenario.rules import START_S
+from quad_web.view import rows
+from quad_web.view.cells import cell_items
+from quad_web.view.items import Trails, poses_item, robots_item, scene_item
+from quad_web.view.state import FleetState, Item, Wanted, robots_by_layer
+
+PERIOD_S = 0.05  # wall time, as the others; the stream sends half as often
+RESTING_S = 0.2  # without clients
+_LAYERS_EVERY, _ROWS_EVERY, _TOPICS_EVERY, _HEALTH_EVERY = 2, 5, 10, 20  # periods
+_EXPECTED_S = 1.5  # time until the simulator's diagnostics tell of a pause or start
+_SETTLES_S = 2.0  # time until a navigator tells of a goal that was sent
+_JUMP_S = 0.5
+
+Shown = Mapping[str, FrozenSet[int]]
+
+
+class FlightSource:
+    """Shows a flight of ROS nodes.
+
+    Attributes:
+        bodies: Poses of the robots.
+        health: States of the nodes.
+        reports: What the nodes say.
+        trees: Parameters of the navigators.
+    """
+
+    def __init__(self, state: FleetState, robots: int, title: str) -> None:
+        """Subscribe to what is rare, and to the rest when there are clients.
+
+        Args:
+            state: Gets the items.
+            robots: Number of robots.
+            title: Name of the flight.
+        """
+        self._state, self._title = state, title
+        self._names = [f"quad{i}" for i in range(robots)]
+        self._frames = Frames(robots)
+        self.bodies = Bodies(robots, self._frames)
+        self.health = FleetHealth(robots)
+        self.reports = FlightReports(robots, state)
+        self.trees = NavigatorTrees(self.reports.trees)
+        self._layers = Layers(robots, self.bodies, self._frames, self.trees.tree)
+        self._obstacles = Obstacles()
+        self._subscriptions = Subscriptions()
+        self._trails = Trails()
+        self._seen: Dict[str, Any] = {}  # data of items that seldom change, by key
+        self._passing: FrozenSet[str] = frozenset()  # keys of items that disappear
+        self._sent: Dict[int, Tuple[float, Pose2D]] = {}  # goals that people have sent
+        self._expected: Tuple[float, Optional[bool]] = (0.0, None)  # until when, is paused
+        self._wanted: Sequence[Wanted] = ()
+        self._count, self._resets, self._stamp_s, self._version = 0, 0, 0.0, -1
+
+    def start(self) -> None:
+        """Show the flight, in a thread."""
+        threading.Thread(target=self._run, name="source", daemon=True).start()
+
+    def expect_paused(self, is_paused: bool) -> None:
+        """Show that the simulation was paused or started before the simulator tells so."""
+        self._expected = time.monotonic() + _EXPECTED_S, is_paused
+
+    def show_goal(self, robot: int, goal: Optional[Pose2D]) -> None:
+        """Show a goal that a person has sent; None removes it."""
+        if goal is None:
+            self._sent.pop(robot, None)
+        else:
+            self._sent[robot] = time.monotonic() + _SETTLES_S, goal
+
+    def _run(self) -> None:
+        while not rospy.is_shutdown():
+            start_s = time.monotonic()
+            wanted = self._state.wanted()
+            try:
+                self._step(wanted)
+            except Exception:  # the pages show what still works
+                if not rospy.core.is_shutdown_requested():
+                    rospy.logerr_throttle(10.0, "web: internal error", exc_info=True)
+            period_s = PERIOD_S if wanted else RESTING_S
+            time.sleep(max(0.0, period_s - (time.monotonic() - start_s)))
+
+    def _step(self, wanted: Sequence[Wanted]) -> None:
+        if bool(wanted) != bool(self._wanted):
+            self._begin() if wanted else self._rest()
+        shown = robots_by_layer(wanted, range(len(self._names)))
+        if wanted != self._wanted or self._count % _TOPICS_EVERY == 0:
+            self._subscribe(wanted, shown)
+        self._wanted = wanted
+        if wanted:
+            self._show(shown)
+        self._count += 1
+
+    def _begin(self) -> None:
+        self._count = 0
+        self.bodies.start()
+        self.health.start()
+        self._obstacles.start()
+        self._trails.clear()
+
+    def _rest(self) -> None:
+        """Remove what would be old when another client comes."""
+        gone = {f"trail/{i}" for i in range(len(self._names))} | self._passing
+        gone |= {"poses", "obstacles", "status", "yields", "samples", "diagnostics"}
+        self._state.remove(*gone)
+        self._passing = frozenset()
+        self._seen.pop("yields", None)
+
+    def _subscribe(self, wanted: Sequence[Wanted], shown: Shown) -> None:
+        topics = self.reports.topics(bool(wanted))
+        if wanted:
+            topics.update(self.bodies.topics())
+            topics.update(self.health.topics())
+            topics.update(self._layers.topics(shown))
+            topics.update(self._obstacles.topics(self.reports.scene))
+        self._subscriptions.want(topics)
+
+    # -- items ---------------------------------------------------------------------------
+
+    def _show(self, shown: Shown) -> None:
+        items: List[Item] = []
+        removed: Set[str] = set()
+        if self.bodies.refresh():
+            removed |= self._track()
+            bodies = self.bodies
+            items.append(poses_item(bodies.stamp_s, bodies.wall_s, bodies.rows))
+        if self._count % _LAYERS_EVERY == 0:
+            items += self._layers.items() + self._trails.items(sorted(shown["trail"]))
+            items += self._cells(sorted(shown["cell"]))
+            items += self._obstacles.items(self.reports.scene)
+            removed |= self._gone(shown)
+        if self._count % _ROWS_EVERY == 0:
+            items += self._tables()
+        if self._count % _HEALTH_EVERY == _HEALTH_EVERY // 2:
+            items.append(self.health.item())
+        items = [item for item in items if item.key not in removed]
+        if items or removed:
+            self._state.put_all(items, tuple(removed))
+
+    def _track(self) -> Set[str]:
+        """Add the poses to the trails; return the keys of those that begin anew."""
+        bodies, removed = self.bodies, set()
+        if bodies.stamp_s < self._stamp_s - _JUMP_S or self.reports.resets != self._resets:
+            self._trails.clear()
+            removed = {f"trail/{i}" for i in range(len(self._names))}
+        self._stamp_s, self._resets = bodies.stamp_s, self.reports.resets
+        for robot, (x_m, y_m) in enumerate(bodies.positions.tolist()):
+            self._trails.add(robot, x_m, y_m)
+        return removed
+
+    def _cells(self, robots: Sequence[int]) -> List[Item]:
+        scene = self.reports.scene
+        if scene is None:
+            return []
+        positions = self.bodies.positions
+        return [
+            item
+            for i in robots
+            for item in cell_items(scene, positions, self.trees.safety_radius_m(i), [i])
+        ]
+
+    def _gone(self, shown: Shown) -> Set[str]:
+        """Return the keys of layers that no page shows, or that a robot no longer has."""
+        keys = set(self._layers.keys) | {f"cell/{i}" for i in shown["cell"]}
+        for i in range(len(self._names)):
+            if not self.health.has_lidar(i):
+                keys.discard(f"scan/{i}")
+            state, silent_s, _ = self.health.navigator(i)
+            if state == "idle":
+                keys -= {f"plan/{i}", f"local_plan/{i}"}
+            if silent_s > LOST_AFTER_S:
+                keys.discard(f"track/{i}")
+        before, self._passing = self._passing, frozenset(keys)
+        return {key for key in before | self._layers.keys if key not in keys}
+
+    def _tables(self) -> List[Item]:
+        reports, stamp_s = self.reports, self.bodies.stamp_s
+        poses = poses_item(stamp_s, 0.0, self.bodies.rows).arrays["pose"]
+        samples = rows.samples_item(
+            stamp_s,
+            poses,
+            self.health.cycles_s(),
+            reports.radius_m,
+            reports.scene,
+            self._obstacles.solids(),
+        )
+        values = samples.arrays["values"].tolist()
+        status = [self._status_row(i, values[i]) for i in range(len(self._names))]
+        seldom = [
+            rows.yields_item(
+                [
+                    row
+                    for i in range(len(self._names))
+                    for row in rows.yield_rows(
+                        i, reports.decision(i), reports.limited_by(i), self._names
+                    )
+                ]
+            ),
+            rows.goals_item(self._goal_rows()),
+            rows.contacts_item(reports.contacts, self._names),
+        ]
+        if self._version != reports.version:
+            self._version = reports.version
+            seldom.append(robots_item(self._names, reports.radius_m))
+            seldom += [scene_item(reports.scene)] if reports.scene is not None else []
+        changed = [item for item in seldom if self._seen.get(item.key) != item.data]
+        self._seen.update({item.key: item.data for item in changed})
+        return [self._flight_item(), rows.status_item(status), samples, *changed]
+
+    def _goal_rows(self) -> List[Dict[str, Any]]:
+        """Return the goals of the mission, and after them those that people have sent."""
+        goals = self.reports.goal_rows()
+        for robot, (settled_s, pose) in list(self._sent.items()):
+            is_over = self.health.navigator(robot)[0] == "idle"
+            if self.reports.sent_s.get(robot, 0.0) > settled_s - _SETTLES_S or (
+                is_over and time.monotonic() > settled_s
+            ):
+                self.show_goal(robot, None)
+                continue
+            index = sum(row["robot"] == robot for row in goals)
+            place = {"x": pose.x_m, "y": pose.y_m, "yaw": pose.yaw_rad}
+            goals.append({"robot": robot, "index": index, **place, "state": "active"})
+        return goals
+
+    def _status_row(self, robot: int, sample: Sequence[float]) -> Dict[str, Any]:
+        navigator, silent_s, reason = self.health.navigator(robot)
+        pose_age_s = float(self.bodies.ages_s()[robot])
+        progress = self.health.progress(robot)
+        lost = self._lost_reason(pose_age_s, silent_s)
+        is_stopped = bool(reason) or progress.is_stopped
+        if lost:
+            self.reports.forget_navigator(robot)
+        elif progress.is_stopped and not reason:
+            reason = "stopped by a person; start resumes its mission"
+        speed_mps = sample[2] if math.isfinite(sample[2]) else 0.0
+        state = rows.robot_state(
+            navigator or "idle",
+            speed_mps,
+            yielding=self.reports.decision(robot),
+            is_done=progress.is_done,
+            is_stopped=is_stopped,
+            is_lost=bool(lost),
+        )
+        return rows.status_row(
+            robot,
+            state,
+            goal=progress.goal,
+            goals=progress.goals,
+            distance_m=progress.distance_m,
+            speed_mps=speed_mps,
+            gap_m=sample[0],
+            recoveries=self.reports.recoveries.get(robot, (0, self.trees.recoveries(robot))),
+            age_s=silent_s if silent_s > LOST_AFTER_S else pose_age_s,
+            lidar=self.health.has_lidar(robot),
+            reason=lost or reason,
+        )
+
+    def _lost_reason(self, pose_age_s: float, silent_s: float) -> str:
+        if silent_s > LOST_AFTER_S:
+            return f"no message of its navigator for {silent_s:.0f} s"
+        if pose_age_s > LOST_AFTER_S and math.isfinite(pose_age_s):
+            return f"no pose for {pose_age_s:.0f} s"
+        return ""
+
+    def _flight_item(self) -> Item:
+        rate, wanted_rate = self.health.rates
+        stamp_s = self.bodies.stamp_s
+        silent_s = float(self.bodies.ages_s().min(initial=math.inf))
+        until_s, is_paused = self._expected
+        if is_paused is None or time.monotonic() > until_s:
+            is_paused = self.health.is_paused
+        state, reason = "running", ""
+        if silent_s > LOST_AFTER_S:
+            state, reason = "waiting", "no poses of any quadcopter"
+        elif is_paused:
+            state = "ready" if stamp_s <= START_S + _JUMP_S else "paused"
+        if wanted_rate is not None and wanted_rate >= FASTEST_RATE:
+            wanted_rate = 0.0
+        return rows.flight_item(
+            "ros",
+            self._title,
+            state,
+            stamp_s,
+            rate=0.0 if is_paused else rate,
+            wanted_rate=wanted_rate,
+            reason=reason,
+        )
