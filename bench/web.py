@@ -42,8 +42,8 @@ from stream_client import open_stream  # noqa: E402
 from synthetic_actions import SyntheticActions  # noqa: E402
 from synthetic_fleet import SyntheticFleet  # noqa: E402
 
-from quad_web.view.state import FleetState  # noqa: E402
 from quad_web.stream import Stream  # noqa: E402
+from quad_web.view.state import FleetState  # noqa: E402
 
 LAYERS = ("trail", "plan", "local_plan", "scan", "global_costmap", "local_costmap")
 SETTLES_S = 2.0

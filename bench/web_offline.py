@@ -36,12 +36,12 @@ from web import cpu_s, descendants  # noqa: E402
 
 from quad_nav.loop.worker_process import processes_for  # noqa: E402
 from quad_nav.offline.run import fly  # noqa: E402
+from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup  # noqa: E402
 from quad_web.offline.actions import FlightActions  # noqa: E402
 from quad_web.offline.view import WebView  # noqa: E402
-from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup  # noqa: E402
-from quad_web.view.state import LAYERS  # noqa: E402
 from quad_web.process import Batch, ServerProcess  # noqa: E402
 from quad_web.server import WebOptions  # noqa: E402
+from quad_web.view.state import LAYERS  # noqa: E402
 
 WARM_UP_S = 30.0
 

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.api import lidar_simulation, prepare
+from quad_nav.scenario.flight_setup import FlightSetup
 from quad_rl.fleet import FleetEnv
 from quad_rl.task import VELOCITY, Observation, Progress, Ranges, default_reward
-from quad_nav.scenario.flight_setup import FlightSetup
 
 __all__ = ["FleetEnv", "Progress", "QuadEnv", "default_reward"]
 _NAME = "quad0"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from quad_nav.api.flight import Command
+from quad_nav.scenario.flight_setup import FlightSetup
 from quad_rl.task import (
     PARAMETERS,
     VELOCITY,
@@ -29,7 +30,6 @@ from quad_rl.task import (
     sequences_of,
 )
 from quad_rl.worlds import NavigatorWorld
-from quad_nav.scenario.flight_setup import FlightSetup
 
 _HOVER = Command(0.0, 0.0, 0.0)
 Action = Optional[NDArray[np.float32]]

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from quad_nav.api.flight import Command
 from quad_nav.errors import InputError
 from quad_nav.mission.goal_file import GoalSequence, parse_goals
-from quad_rl.worlds import BodyWorld, NavigatorWorld, World
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.sim.flight import BodyState
+from quad_rl.worlds import BodyWorld, NavigatorWorld, World
 
 VELOCITY, PARAMETERS = "velocity", "parameters"
 ACTIONS = (VELOCITY, PARAMETERS)

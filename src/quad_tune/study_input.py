@@ -6,8 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, List, Sequence, Tuple, Union
 
-from quad_nav import config
 from quad_bench.barn.setup import BarnOptions
+from quad_nav import config
 from quad_nav.config.files import set_value
 from quad_nav.config.notes import without_effect
 from quad_nav.config.robot_tree import RobotSource, fitted, unfitted_tree

@@ -17,6 +17,7 @@ from quad_nav.files import plain_yaml
 from quad_nav.files.document import yaml_fault
 from quad_nav.files.user_files import read_text
 from quad_nav.offline.workers import Workers
+from quad_nav.versions import versions
 from quad_tune.courses import LIDAR, Case, identity_text
 from quad_tune.evaluation import Course, Evaluation, StudyObserver, task_of
 from quad_tune.flight_cache import FlightCache
@@ -25,7 +26,6 @@ from quad_tune.space import Dimension, SearchSpace
 from quad_tune.statistics import FlightStatistics, flight_statistics
 from quad_tune.study_database import NotStored
 from quad_tune.study_input import CourseOptions, parameter_faults, read_course
-from quad_nav.versions import versions
 
 _BASE = "base"
 _NAME = "sweep"

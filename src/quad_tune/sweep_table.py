@@ -9,10 +9,10 @@ from typing import Any, Dict, List, Optional, Sequence
 
 import tabulate
 
+from quad_nav.versions import versions
 from quad_tune.statistics import FlightStatistics
 from quad_tune.study_text import format_value
 from quad_tune.sweep import SweepRow, SweepSetup
-from quad_nav.versions import versions
 
 _HEADER = [
     "flights",

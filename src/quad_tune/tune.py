@@ -9,12 +9,13 @@ from typing import Any, Dict, Mapping, Optional, Sequence, Tuple
 import optuna
 from optuna.trial import FrozenTrial
 
-from quad_nav import config
 from quad_bench.barn.setup import BarnOptions
+from quad_nav import config
 from quad_nav.config.plugins import plugin_name
 from quad_nav.errors import InputError, QuadError
 from quad_nav.files.shipped import shipped
 from quad_nav.offline.workers import Workers
+from quad_nav.versions import versions
 from quad_tune.courses import Case
 from quad_tune.evaluation import Course, Evaluation, StudyObserver
 from quad_tune.flight_result import FlightResult
@@ -27,7 +28,6 @@ from quad_tune.statistics import Comparison, compare
 from quad_tune.study import TuneStudy, open_study
 from quad_tune.study_database import NotStored
 from quad_tune.study_input import CourseOptions, parameter_faults, read_course, with_config
-from quad_nav.versions import versions
 
 TUNED = "tuned"
 _DWA = "DWAPlannerROS"

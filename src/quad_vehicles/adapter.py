@@ -7,7 +7,8 @@ from abc import ABC, abstractmethod
 from typing import Callable, Dict, Generic, List, Mapping, Optional, Tuple, TypeVar
 
 from quad_nav.geometry import Scan, Twist2D
-from quad_vehicles.orders import Output, State
+from quad_nav.topics.vehicle_states import State
+from quad_vehicles.orders import Output
 from quad_vehicles.ranges import Range, fault
 from quad_vehicles.setpoints import SetpointClock
 from quad_vehicles.states import VehicleMachine

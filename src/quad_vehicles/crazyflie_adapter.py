@@ -19,10 +19,11 @@ from typing import Callable, Dict, List, Mapping, Optional, Tuple
 import numpy as np
 
 from quad_nav.geometry import Pose3D, Scan, rotate
+from quad_nav.topics.vehicle_states import State
 from quad_vehicles.adapter import VehicleAdapter
 from quad_vehicles.arrival_clock import ArrivalClock
 from quad_vehicles.frames import crazyflie_quaternion
-from quad_vehicles.orders import Order, Output, State, Traits
+from quad_vehicles.orders import Order, Output, Traits
 from quad_vehicles.ranges import CRAZYFLIE
 from quad_vehicles.setpoints import limited
 from quad_vehicles.states import VehicleMachine

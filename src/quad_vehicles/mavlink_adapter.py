@@ -12,6 +12,7 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Set, Tuple
 
 from quad_nav.errors import printable
 from quad_nav.geometry import Pose3D, Quaternion, rotate
+from quad_nav.topics.vehicle_states import IN_FLIGHT, State
 from quad_vehicles import failsafes
 from quad_vehicles.adapter import VehicleAdapter
 from quad_vehicles.autopilots import AUTOPILOT_COMPONENT, AUTOPILOTS
@@ -24,7 +25,7 @@ from quad_vehicles.frames import (
     scan_from_obstacle_distance,
 )
 from quad_vehicles.health_watch import HealthWatch
-from quad_vehicles.orders import IN_FLIGHT, Answer, Order, Output, State
+from quad_vehicles.orders import Answer, Order, Output
 from quad_vehicles.ranges import MAVLINK
 from quad_vehicles.setpoints import led, limited, setpoint_fields
 from quad_vehicles.states import VehicleMachine

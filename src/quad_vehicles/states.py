@@ -15,19 +15,10 @@ from dataclasses import replace
 from typing import Callable, Dict, List, Optional
 
 from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.topics.vehicle_states import IN_FLIGHT, ON_GROUND, State
 from quad_vehicles import safety
 from quad_vehicles.inputs import Inputs
-from quad_vehicles.orders import (
-    IN_FLIGHT,
-    ON_GROUND,
-    Answer,
-    Order,
-    Output,
-    Permissions,
-    Response,
-    State,
-    Traits,
-)
+from quad_vehicles.orders import Answer, Order, Output, Permissions, Response, Traits
 from quad_vehicles.safety import Danger, FlightView, Reaction, danger, inside_fence
 from quad_vehicles.setpoints import HeightLoop
 from quad_vehicles.telemetry import Landed, Limits, Velocity

@@ -13,8 +13,8 @@ from nicegui import ui
 from nicegui.events import KeyEventArguments
 
 from quad_nav.errors import printable
-from quad_web.view.actions import Role
 from quad_web.page_client import PageClient
+from quad_web.view.actions import Role
 
 STOP_KEY = "."
 RATES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 0.0)

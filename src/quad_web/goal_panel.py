@@ -14,11 +14,11 @@ from typing import Any, Callable, Dict, List, Optional, Sequence
 from nicegui import background_tasks, ui
 
 from quad_nav.errors import printable
-from quad_web.view.actions import Answer, GoalChange, GoalFileView
 from quad_web.flight_bar import enable
 from quad_web.goal_draft import FIELDS, GoalDraft
 from quad_web.page_client import PageClient
 from quad_web.robot_panels import pose_of, typed_number
+from quad_web.view.actions import Answer, GoalChange, GoalFileView
 
 PAGE = 50
 """Goals in the list at a time."""

@@ -12,10 +12,10 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence
 from nicegui import ui
 
 from quad_nav.errors import excerpt
-from quad_web.view.state import MAX_EVENTS, Event
 from quad_web.flight_bar import clock_text
 from quad_web.live_table import LiveTable, column
 from quad_web.page_client import PageClient
+from quad_web.view.state import MAX_EVENTS, Event
 
 LEVELS = {
     "all": ["info", "warning", "error"],

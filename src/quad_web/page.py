@@ -17,8 +17,6 @@ from typing import Any, Dict, Optional
 from nicegui import background_tasks, context, ui
 
 from quad_nav.errors import excerpt
-from quad_web.view.actions import Actions, Answer, Role
-from quad_web.view.state import FleetState
 from quad_web.arena import SHOWN, SHOWN_AT_FIRST, Arena, Charts
 from quad_web.flight_bar import FlightBar, StopButton, enable
 from quad_web.goal_panel import GoalEditor
@@ -26,6 +24,8 @@ from quad_web.log_panels import Diagnostics, EventLog
 from quad_web.page_client import PageClient
 from quad_web.parameter_panel import Parameters
 from quad_web.robot_panels import RobotCard, RobotTable
+from quad_web.view.actions import Actions, Answer, Role
+from quad_web.view.state import FleetState
 
 _STYLE = Path(__file__).parent / "static" / "page.css"
 _LONGEST = 600  # characters of an answer

@@ -13,10 +13,10 @@ from typing import Any, Callable, Dict, Iterable, List, Optional, Sequence, Tupl
 from nicegui import ui
 
 from quad_nav.errors import excerpt
-from quad_web.view.actions import Answer, ParameterView
 from quad_web.flight_bar import enable
 from quad_web.page_client import PageClient
 from quad_web.robot_panels import typed_number
+from quad_web.view.actions import Answer, ParameterView
 
 _WIDEST = 1e6  # a wider range is none: dynamic_reconfigure writes its largest double for "no limit"
 _STEPS = 200

@@ -22,10 +22,10 @@ from typing import Any, Callable, Dict, FrozenSet, List, Optional, Tuple
 
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import in_folder, outside_current_folder
+from quad_web.server import Server, Urls, WebOptions
 from quad_web.view.actions import Actions, Answer
 from quad_web.view.message_socket import MessageSocket
 from quad_web.view.state import FleetState, Item, Wanted
-from quad_web.server import Server, Urls, WebOptions
 
 STARTS_WITHIN_S = 60.0
 ANSWERS_WITHIN_S = 10.0

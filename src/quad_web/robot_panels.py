@@ -16,10 +16,10 @@ from nicegui import ui
 from quad_nav.errors import printable
 from quad_nav.geometry import Pose2D, angle_difference
 from quad_nav.mission.goal import goal_faults
-from quad_web.view.state import FleetState
 from quad_web.flight_bar import enable, why_idle
 from quad_web.live_table import LiveTable, column
 from quad_web.page_client import PageClient
+from quad_web.view.state import FleetState
 
 _HINT = "Click one in the table or in the arena. A goal goes to the nearest one."
 _STEP_S = 0.5  # ages below are shown as one, so that an idle row does not change

@@ -18,12 +18,12 @@ from dataclasses import dataclass
 from typing import Any, Callable, Iterator, Optional, Tuple
 
 from quad_nav.errors import InputError
-from quad_web.view.actions import Actions, Role, WatchOnly
-from quad_web.view.state import FleetState
 from quad_web.access import ROLE, Access, Tokens, is_loopback, refuse
 from quad_web.connections import MAX_OF_ADDRESS, limited
 from quad_web.page_limits import Complaints, drop_old_pages, limit_pages, only_texts
 from quad_web.stream import Message, Receive, Send, Stream
+from quad_web.view.actions import Actions, Role, WatchOnly
+from quad_web.view.state import FleetState
 
 _FIRST_PORT, _LAST_PORT = 8080, 8179
 _TOKEN_BYTES = 24

@@ -31,11 +31,12 @@ from vehicles.point_vehicle import PointVehicle
 from vehicles.virtual_flight import KINDS
 
 from quad_nav.geometry import Twist2D
+from quad_nav.topics.vehicle_states import ON_GROUND, State
 from quad_vehicles import failsafes
 from quad_vehicles.autopilots import AUTOPILOTS
 from quad_vehicles.mavlink_adapter import MavlinkAdapter
 from quad_vehicles.mavlink_link import MavlinkLink, UdpSocket, ardupilotmega
-from quad_vehicles.orders import ON_GROUND, Permissions, State
+from quad_vehicles.orders import Permissions
 from quad_vehicles.states import VehicleMachine
 from quad_vehicles.telemetry import Limits
 from quad_vehicles.vehicle_file import Lidar, Vehicle

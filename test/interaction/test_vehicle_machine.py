@@ -20,7 +20,7 @@ from hypothesis.stateful import (  # noqa: E402
 from interaction.machines import assert_sound, machine_settings  # noqa: E402
 from interaction.vehicle_world import EPOCH_S, STEP_S, VEHICLES, VehicleWorld  # noqa: E402
 
-from quad_vehicles.orders import IN_FLIGHT, State  # noqa: E402
+from quad_nav.topics.vehicle_states import IN_FLIGHT, State  # noqa: E402
 
 NUMBER = st.integers(0, VEHICLES - 1)
 CHANGES_MODE, RETURNS_MODE, MOVES_STICK, FREES_STICK, DISARMS = (

@@ -20,12 +20,12 @@ from vehicles.stand_in import advance
 from vehicles.virtual_flight import GROUND_STATION, STAND_INS, STATION_HEARTBEAT
 
 from quad_nav.geometry import Pose2D
-from quad_vehicles.ros import node
-from quad_vehicles.ros.fleet import VehicleFleet
 from quad_vehicles.autopilots import AUTOPILOTS
 from quad_vehicles.link import VehicleLink
 from quad_vehicles.mavlink_adapter import MavlinkAdapter
 from quad_vehicles.orders import Permissions
+from quad_vehicles.ros import node
+from quad_vehicles.ros.fleet import VehicleFleet
 from quad_vehicles.states import VehicleMachine
 from quad_vehicles.telemetry import Limits
 from quad_vehicles.vehicle_file import OUR_SYSTEM, Vehicle

@@ -24,8 +24,9 @@ sys.path.insert(1, str(Path(__file__).resolve().parents[1]))
 from vehicles.virtual_flight import Flight  # noqa: E402
 
 from quad_nav.geometry import Pose2D
+from quad_nav.topics.vehicle_states import State
+from quad_vehicles.orders import Output
 from quad_vehicles.ros import fleet, maneuvers, node, topics
-from quad_vehicles.orders import Output, State
 from quad_vehicles.vehicle_file import Lidar, Vehicle
 
 DRIVER_TOPIC = "/rplidar/scan"

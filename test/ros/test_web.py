@@ -21,11 +21,11 @@ from websockets.sync.client import connect
 
 from quad_nav.geometry import Pose2D
 from quad_nav.ros.common.conversions import marker_array
-from quad_web.ros.actions import FlightActions
-from quad_web.ros.source import FlightSource
 from quad_nav.topics.right_of_way import RIGHT_OF_WAY_STATUS, RightOfWay
 from quad_nav.topics.tracked_obstacles import track_markers
 from quad_nav.tracking.tracks import Tracks
+from quad_web.ros.actions import FlightActions
+from quad_web.ros.source import FlightSource
 from quad_web.view.actions import GoalChange
 from quad_web.view.codec import decode
 from quad_web.view.state import LAYERS, FleetState, Wanted

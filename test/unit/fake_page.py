@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import List
 
-from quad_web.view.state import LAYERS, FleetState, Wanted
 from quad_web.process import Batch, Call
+from quad_web.view.state import LAYERS, FleetState, Wanted
 
 EVERYTHING = Wanted(frozenset(LAYERS), 0)
 

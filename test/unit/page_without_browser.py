@@ -10,10 +10,10 @@ from nicegui import Client, background_tasks, core, ui
 from nicegui.app.app import State
 from nicegui.page import page as nicegui_page
 
-from quad_web.view.actions import Actions, Answer, GoalFileView, ParameterView, Role
-from quad_web.view.state import FleetState
 from quad_web.page import Page
 from quad_web.page_client import LABELS
+from quad_web.view.actions import Actions, Answer, GoalFileView, ParameterView, Role
+from quad_web.view.state import FleetState
 
 PARAMETERS = (
     ParameterView("", "planner_frequency", "double", 0.0, 0.0, 0.0, 100.0, doc="Hz"),

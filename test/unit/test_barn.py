@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from quad_nav import config
 from quad_bench.barn.protocol import Outcome, Run, metric
 from quad_bench.barn.results import Results, differences
 from quad_bench.barn.runs import fly_all, fly_world, judge
@@ -20,6 +19,7 @@ from quad_bench.barn.setup import BarnOptions, flight_setup, read_barn_setup
 from quad_bench.barn.statistics import barn_statistics
 from quad_bench.barn.worlds import BarnWorld, load_worlds
 from quad_bench.cli.barn import barn
+from quad_nav import config
 from quad_nav.errors import InputError
 from quad_nav.mission.flight_log import Leg
 from quad_nav.mission.goal import Goal

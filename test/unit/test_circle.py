@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from quad_bench.circle.orca import Orca, OrcaParams
+from quad_bench.circle.picture import PathsPanel, paths_figure
 from quad_bench.circle.results import (
     CircleResults,
     circle_statistics,
@@ -28,7 +29,6 @@ from quad_bench.circle.setup import (
 )
 from quad_nav.cli import circle as command
 from quad_nav.errors import InputError
-from quad_bench.circle.picture import PathsPanel, paths_figure
 from quad_nav.sim.scene import BODY_RADIUS_M
 
 needs_orca = pytest.mark.skipif(

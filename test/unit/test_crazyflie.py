@@ -10,9 +10,10 @@ from vehicles import crazyflie_failures
 from vehicles.crazyflie_flight import AHEAD, CrazyflieFlight
 
 from quad_nav.geometry import Pose3D, Twist2D
+from quad_nav.topics.vehicle_states import State
 from quad_vehicles.arrival_clock import ArrivalClock
 from quad_vehicles.frames import crazyflie_quaternion
-from quad_vehicles.orders import Permissions, State
+from quad_vehicles.orders import Permissions
 
 
 @pytest.fixture

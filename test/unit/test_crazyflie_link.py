@@ -14,9 +14,10 @@ from vehicles.crazyflie import AIRFRAME, Crazyflie  # noqa: E402
 from vehicles.crazyflie_server import Server, fly  # noqa: E402
 
 from quad_nav.geometry import Twist2D  # noqa: E402
+from quad_nav.topics.vehicle_states import State  # noqa: E402
 from quad_vehicles import crazyflie_link  # noqa: E402
 from quad_vehicles.crazyflie_adapter import TRAITS  # noqa: E402
-from quad_vehicles.orders import Permissions, State  # noqa: E402
+from quad_vehicles.orders import Permissions  # noqa: E402
 from quad_vehicles.states import VehicleMachine  # noqa: E402
 from quad_vehicles.telemetry import Limits  # noqa: E402
 from quad_vehicles.vehicle_file import Lidar, Vehicle  # noqa: E402

@@ -6,8 +6,8 @@ import pytest
 from click.testing import CliRunner
 from study_flights import FLOWN, tune_setup, without_flying, write_mission
 
-from quad_tune.cli.flights_bar import FlightsBar
 from quad_nav.cli.progress import FlightPace, duration_text, processes_text
+from quad_tune.cli.flights_bar import FlightsBar
 from quad_tune.cli.sweep import sweep
 from quad_tune.evaluation import StudyObserver
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from quad_nav import errors
 from quad_bench.barn import arrays
+from quad_nav import errors
 from quad_nav.config import workload
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.static import StaticLayerParams

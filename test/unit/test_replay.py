@@ -11,9 +11,9 @@ from hand_made_recording import LAST_S, SUFFIXES, write_flight, x_at
 
 from quad_nav.cli import main
 from quad_nav.recording import replay as replay_module
+from quad_nav.sim.scene import BODY_RADIUS_M
 from quad_web.replay.recorded_flight import RecordedFlight
 from quad_web.replay.replay import FASTEST, OpenedReplay, Replay
-from quad_nav.sim.scene import BODY_RADIUS_M
 from quad_web.view.actions import Answer
 from quad_web.view.state import LAYERS, FleetState, Wanted
 

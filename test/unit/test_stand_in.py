@@ -14,7 +14,7 @@ from vehicles.virtual_flight import StandInFlight
 
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.scene import Box, Scene, Walls
-from quad_vehicles.orders import State
+from quad_nav.topics.vehicle_states import State
 
 HEADING_RAD = 0.5
 WALL = Box("wall", 4.0, 2.0, 0.2, 4.0, 2.0)

@@ -11,7 +11,7 @@ from vehicles.px4 import AIRFRAME, HOLD, INT32, LAND, OFFBOARD, REJECTED, Px4
 from vehicles.stand_in import ACCEPTED, IN_AIR, ON_GROUND
 from vehicles.virtual_flight import StandInFlight
 
-from quad_vehicles.orders import State
+from quad_nav.topics.vehicle_states import State
 
 
 class Desk:

@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 from study_flights import SYNTHETIC_SPACE, write_mission
 from test_tuning_search import IDENTITY, run
 
-from quad_tune.cli.sweep import sweep
 from quad_nav.errors import InputError
+from quad_tune.cli.sweep import sweep
 from quad_tune.flight_cache import FlightCache
 from quad_tune.study import open_study
 

@@ -17,9 +17,9 @@ from study_flights import (
     write_mission,
 )
 
+from quad_nav.errors import InputError
 from quad_tune.cli.sweep import sweep
 from quad_tune.cli.tune import tune
-from quad_nav.errors import InputError
 from quad_tune.evaluation import StudyObserver
 from quad_tune.flight_cache import FlightCache
 from quad_tune.study import open_study

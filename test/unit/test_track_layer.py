@@ -10,14 +10,14 @@ import pytest
 from fake_page import Clock, FakePage
 
 from quad_nav.offline.run import fly
-from quad_web.replay.recorded_flight import SHOWN_FOR_S, RecordedFlight
 from quad_nav.recording.recorder import Recorder
-from quad_web.offline.actions import FlightActions
-from quad_web.offline.view import WebView
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.motion import Motion
 from quad_nav.sim.scene import Cylinder, MovingObstacle
 from quad_nav.topics.tracked_obstacles import TrackKind
+from quad_web.offline.actions import FlightActions
+from quad_web.offline.view import WebView
+from quad_web.replay.recorded_flight import SHOWN_FOR_S, RecordedFlight
 from quad_web.view.state import Wanted
 
 ROOT = Path(__file__).resolve().parents[2]

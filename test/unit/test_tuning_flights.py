@@ -25,15 +25,15 @@ from study_flights import (
 )
 from test_report_page import assert_loads_nothing
 
-from quad_nav import config
 from quad_bench.barn.protocol import Outcome
 from quad_bench.barn.runs import fly_world
 from quad_bench.barn.setup import BarnOptions, read_barn_setup
-from quad_tune.cli.sweep import sweep
-from quad_tune.cli.tune import tune
+from quad_nav import config
 from quad_nav.errors import InputError
 from quad_nav.offline.workers import MAX_DEATHS, LocalWorkers, WorkersLost, fly_all
 from quad_tune.barn_course import BarnCourse
+from quad_tune.cli.sweep import sweep
+from quad_tune.cli.tune import tune
 from quad_tune.courses import HELD_OUT_SEED, Case, Mission, MissionCourse, check_missions
 from quad_tune.evaluation import task_of
 from quad_tune.flight_result import FlightTask, fly_task

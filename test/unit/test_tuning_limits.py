@@ -11,10 +11,10 @@ from click.testing import CliRunner
 from study_flights import FLOWN, PaperWorkers, tune_setup, without_flying, write_mission
 
 from quad_nav import config
-from quad_tune.cli.tune import tune
 from quad_nav.config.spec import Table
 from quad_nav.config.tables import costmap, dwa_planner, recoveries, trajectory_planner
 from quad_nav.errors import InputError
+from quad_tune.cli.tune import tune
 from quad_tune.evaluation import StudyObserver
 from quad_tune.parameter_files import write_parameters
 from quad_tune.robot_limits import hold_limits, is_limit, is_protected

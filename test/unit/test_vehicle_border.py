@@ -12,12 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from vehicles.virtual_flight import Flight
 
+from quad_nav.topics.vehicle_states import State
 from quad_vehicles import failsafes, ranges
 from quad_vehicles.adapter import VehicleAdapter
 from quad_vehicles.crazyflie_adapter import TRAITS, CrazyflieAdapter
 from quad_vehicles.frames import scan_from_obstacle_distance
 from quad_vehicles.mavlink_adapter import MavlinkAdapter
-from quad_vehicles.orders import Permissions, State
+from quad_vehicles.orders import Permissions
 from quad_vehicles.states import VehicleMachine
 from quad_vehicles.telemetry import Limits
 from quad_vehicles.vehicle_file import Lidar, Vehicle

@@ -8,8 +8,8 @@ import pytest
 from vehicles.point_vehicle import ARDUPILOT, PX4
 from vehicles.virtual_flight import StandInFlight
 
+from quad_nav.topics.vehicle_states import State
 from quad_vehicles import failsafes
-from quad_vehicles.orders import State
 from quad_vehicles.vehicle_file import Vehicle
 
 VEHICLE = Vehicle(3, "mavlink", bridge_system=237)

@@ -15,9 +15,9 @@ from std_msgs.msg import Empty, String  # noqa: E402
 from std_srvs.srv import TriggerRequest, TriggerResponse  # noqa: E402
 
 from quad_nav.geometry import Pose2D  # noqa: E402
+from quad_nav.topics.flight_info import EVENTS_TOPIC  # noqa: E402
 from quad_vehicles.ros import fleet  # noqa: E402
 from quad_vehicles.ros.node import LAND_ALL_TOPIC  # noqa: E402
-from quad_nav.topics.flight_info import EVENTS_TOPIC  # noqa: E402
 from quad_vehicles.vehicle_file import Vehicle  # noqa: E402
 
 

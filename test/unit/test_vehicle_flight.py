@@ -11,8 +11,9 @@ from vehicles.point_bodies import PointBodies
 from vehicles.virtual_flight import STEP_S, Flight, StandInFlight
 
 from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.topics.vehicle_states import State
 from quad_vehicles.autopilots import SET_MESSAGE_INTERVAL
-from quad_vehicles.orders import Permissions, State
+from quad_vehicles.orders import Permissions
 
 
 @pytest.fixture(params=["ardupilot", "px4"])

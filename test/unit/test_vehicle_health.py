@@ -10,10 +10,10 @@ from types import SimpleNamespace
 import pytest
 from vehicles.virtual_flight import Flight, StandInFlight
 
+from quad_nav.topics.vehicle_states import State
 from quad_vehicles.autopilots import ARDUPILOT, PX4
 from quad_vehicles.exchanges import Parameters
 from quad_vehicles.health_watch import HealthWatch
-from quad_vehicles.orders import State
 from quad_vehicles.vehicle_file import OUR_SYSTEM
 
 SENSORS, BATTERY = 1467087919, 1 << 25  # health of a vehicle that hovers

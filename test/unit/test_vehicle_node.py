@@ -14,9 +14,9 @@ from std_srvs.srv import TriggerRequest  # noqa: E402
 from vehicles.virtual_flight import StandInFlight  # noqa: E402
 
 from quad_nav.geometry import Pose2D  # noqa: E402
-from quad_vehicles.ros import node, topics  # noqa: E402
+from quad_nav.topics.vehicle_states import State  # noqa: E402
 from quad_vehicles.link import VehicleLink  # noqa: E402
-from quad_vehicles.orders import State  # noqa: E402
+from quad_vehicles.ros import node, topics  # noqa: E402
 from quad_vehicles.vehicle_file import Vehicle  # noqa: E402
 
 VEHICLE = Vehicle(0, "mavlink", map_from_start=Pose2D(1.5, 1.5, 0.0))

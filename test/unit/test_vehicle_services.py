@@ -14,8 +14,9 @@ from ros.fake_ros import FakeRos, FakeService  # noqa: E402
 from std_srvs.srv import TriggerRequest  # noqa: E402
 from vehicles.virtual_flight import Flight  # noqa: E402
 
+from quad_nav.topics.vehicle_states import State  # noqa: E402
+from quad_vehicles.orders import Output  # noqa: E402
 from quad_vehicles.ros import maneuvers, node  # noqa: E402
-from quad_vehicles.orders import Output, State  # noqa: E402
 from quad_vehicles.vehicle_file import Vehicle  # noqa: E402
 
 

@@ -9,9 +9,9 @@ import socket
 import pytest
 
 from quad_nav.errors import InputError
-from quad_web.view.actions import Role
 from quad_web.access import ROLE, Access, Tokens, is_loopback
 from quad_web.server import WebOptions
+from quad_web.view.actions import Role
 
 TOKENS = Tokens("steer-abc", "watch-def")
 

@@ -12,8 +12,8 @@ import pytest
 from page_without_browser import Recorded, fleet, with_page
 
 from quad_nav.geometry import Pose2D
-from quad_web.view.actions import Answer, GoalChange, GoalFileView, Role
 from quad_web.page_client import LABELS
+from quad_web.view.actions import Answer, GoalChange, GoalFileView, Role
 
 POSE = {"x": 3.0, "y": 4.0, "yaw": None}
 

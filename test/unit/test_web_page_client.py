@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from page_without_browser import Recorded, fleet
 
-from quad_web.view.actions import Actions, Answer, Role
 from quad_web import page_client
 from quad_web.page_client import LABELS, NOT_HERE, READS, WATCHES, PageClient
+from quad_web.view.actions import Actions, Answer, Role
 
 WEB = Path(page_client.__file__).parent
 

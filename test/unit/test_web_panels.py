@@ -9,7 +9,6 @@ import pytest
 from page_without_browser import PARAMETERS, fleet
 
 from quad_nav.geometry import Pose2D
-from quad_web.view.actions import GoalChange, GoalFileView, ParameterView
 from quad_web import log_panels as logs
 from quad_web import robot_panels as robots
 from quad_web.flight_bar import RATES, clock_text, rate_step, rate_text
@@ -22,6 +21,7 @@ from quad_web.parameter_panel import (
     slider_step,
     widget_kind,
 )
+from quad_web.view.actions import GoalChange, GoalFileView, ParameterView
 
 
 @pytest.mark.parametrize(

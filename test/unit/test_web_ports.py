@@ -9,10 +9,10 @@ from urllib.parse import urlsplit
 import pytest
 
 from quad_nav.errors import InputError
-from quad_web.view.actions import Actions
-from quad_web.view.state import FleetState
 from quad_web.access import Tokens
 from quad_web.server import Server, Urls, WebOptions, _bound, _urls
+from quad_web.view.actions import Actions
+from quad_web.view.state import FleetState
 
 
 def test_a_port_is_taken_before_the_server_runs():

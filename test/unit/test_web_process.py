@@ -9,10 +9,10 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
+from quad_web.process import Batch, Call, ServedSource, require_nicegui
 from quad_web.view.actions import Actions, Answer
 from quad_web.view.message_socket import MessageSocket
 from quad_web.view.state import Item, Wanted
-from quad_web.process import Batch, Call, ServedSource, require_nicegui
 
 
 def pair():

@@ -8,10 +8,10 @@ import time
 
 import pytest
 
-from quad_web.view.codec import decode
-from quad_web.view.state import FleetState, Item, Wanted
 from quad_web import stream as web_stream
 from quad_web.stream import Stream
+from quad_web.view.codec import decode
+from quad_web.view.state import FleetState, Item, Wanted
 
 PATIENCE_S = 10.0
 

@@ -15,12 +15,12 @@ from quad_nav.geometry import Pose2D
 from quad_nav.mission.summary import to_json
 from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly
-from quad_web.offline.actions import STARTED_AGAIN, STOPPED, FlightActions
-from quad_web.offline.view import WebView
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.movers import Movers
 from quad_nav.sim.simulation import SimulationParams
+from quad_web.offline.actions import STARTED_AGAIN, STOPPED, FlightActions
+from quad_web.offline.view import WebView
 from quad_web.view.actions import GoalChange
 from quad_web.view.state import LAYERS, Wanted
 

@@ -16,7 +16,7 @@ import sys
 from vehicles.crazyflie_flight import CrazyfliePair
 
 from quad_nav.geometry import Twist2D
-from quad_vehicles.orders import State
+from quad_nav.topics.vehicle_states import State
 
 HOVER_MPS, DESCENT_M, NEIGHBOUR_M = 0.05, 0.02, 0.05
 COMMAND = Twist2D(0.3, 0.1, 0.2)

@@ -11,8 +11,9 @@ from vehicles.virtual_flight import STARTS
 
 from quad_nav.geometry import Twist2D
 from quad_nav.sim.simulation import STEP_S
+from quad_nav.topics.vehicle_states import State
 from quad_vehicles.crazyflie_adapter import TRAITS, CrazyflieAdapter
-from quad_vehicles.orders import Permissions, State
+from quad_vehicles.orders import Permissions
 from quad_vehicles.states import VehicleMachine
 from quad_vehicles.telemetry import Limits
 from quad_vehicles.vehicle_file import Lidar, Vehicle

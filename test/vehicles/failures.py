@@ -18,7 +18,7 @@ import sys
 from vehicles.virtual_flight import STAND_INS, Flight, PairFlight, StandInFlight
 
 from quad_nav.geometry import Twist2D
-from quad_vehicles.orders import State
+from quad_nav.topics.vehicle_states import State
 
 CLOCK_ROW = "the vehicle's clock steps back"
 HOVER_MPS = 0.05

@@ -36,10 +36,11 @@ from quad_nav.mission.summary import summarize
 from quad_nav.offline.flight import Flight
 from quad_nav.sim.flight import AIRFRAMES, BodyState
 from quad_nav.sim.simulation import STEP_S, Simulation
+from quad_nav.topics.vehicle_states import State
 from quad_vehicles import crazyflie_adapter
 from quad_vehicles.autopilots import AUTOPILOTS
 from quad_vehicles.mavlink_adapter import MavlinkAdapter
-from quad_vehicles.orders import Permissions, State
+from quad_vehicles.orders import Permissions
 from quad_vehicles.states import VehicleMachine
 from quad_vehicles.telemetry import Limits
 from quad_vehicles.vehicle_file import OUR_SYSTEM, Vehicle

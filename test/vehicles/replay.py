@@ -24,9 +24,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from quad_nav.geometry import Twist2D
+from quad_nav.topics.vehicle_states import State
 from quad_vehicles.autopilots import AUTOPILOTS
 from quad_vehicles.mavlink_adapter import MavlinkAdapter
-from quad_vehicles.orders import Permissions, State
+from quad_vehicles.orders import Permissions
 from quad_vehicles.states import VehicleMachine
 from quad_vehicles.telemetry import Limits
 from quad_vehicles.vehicle_file import OUR_SYSTEM, Vehicle

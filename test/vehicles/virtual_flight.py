@@ -16,9 +16,10 @@ from vehicles.stand_in import advance
 
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.sim.simulation import STEP_S as STEP
+from quad_nav.topics.vehicle_states import State
 from quad_vehicles.autopilots import AUTOPILOTS
 from quad_vehicles.mavlink_adapter import MavlinkAdapter
-from quad_vehicles.orders import Permissions, State
+from quad_vehicles.orders import Permissions
 from quad_vehicles.states import VehicleMachine
 from quad_vehicles.telemetry import Limits
 from quad_vehicles.vehicle_file import OUR_SYSTEM, Vehicle

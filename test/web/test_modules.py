@@ -10,9 +10,9 @@ import threading
 import numpy as np
 import pytest
 
+from quad_web.arena import STATIC
 from quad_web.view.codec import encode
 from quad_web.view.state import Item
-from quad_web.arena import STATIC
 
 
 class _Quiet(http.server.SimpleHTTPRequestHandler):

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import difflib
 import errno
-import importlib
 import io
 import os
 import sys
@@ -18,6 +17,7 @@ from typing import Any, Dict, Iterator, List, Optional, Tuple
 import click
 
 import quad_nav
+from quad_nav.cli import add_ons
 from quad_nav.errors import printable
 
 # The exit statuses of every command; 130 after Ctrl-C as from a shell.
@@ -26,19 +26,19 @@ EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 # Errors of a write to standard output; the commands handle those of their own files.
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
-COMMANDS: Dict[str, str] = {
-    "barn": "Fly through the worlds of the BARN benchmark without ROS.",
-    "dynabarn": "Fly among the moving obstacles of DynaBARN without ROS.",
-    "check": "Check move_base's YAML without flying.",
-    "circle": "Let robots on a circle swap sides, beside ORCA.",
-    "fly": "Fly a mission without ROS, as fast as the machine allows.",
-    "preview": "Show a mission before anything flies, and edit its goals.",
-    "replay": "Play a recorded flight on a page in the browser.",
-    "report": "Write a report of a recorded flight, or compare several.",
-    "sweep": "Compare flights over the values of some parameters.",
-    "tune": "Search for parameters that fly better, without ROS.",
+COMMANDS: Dict[str, Tuple[str, str]] = {
+    "barn": ("quad_bench", "Fly through the worlds of the BARN benchmark without ROS."),
+    "dynabarn": ("quad_bench", "Fly among the moving obstacles of DynaBARN without ROS."),
+    "check": ("quad_nav", "Check move_base's YAML without flying."),
+    "circle": ("quad_bench", "Let robots on a circle swap sides, beside ORCA."),
+    "fly": ("quad_nav", "Fly a mission without ROS, as fast as the machine allows."),
+    "preview": ("quad_nav", "Show a mission before anything flies, and edit its goals."),
+    "replay": ("quad_web", "Play a recorded flight on a page in the browser."),
+    "report": ("quad_nav", "Write a report of a recorded flight, or compare several."),
+    "sweep": ("quad_tune", "Compare flights over the values of some parameters."),
+    "tune": ("quad_tune", "Search for parameters that fly better, without ROS."),
 }
-"""Name -> line in the list of commands."""
+"""Name -> its package and its line in the list of commands. The module is `package.cli.name`."""
 
 
 @contextmanager
@@ -103,17 +103,22 @@ class Commands(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands without importing their modules."""
         with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+            formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
 
     def list_commands(self, ctx: click.Context) -> List[str]:
         """Return the names of all commands."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> Optional[click.Command]:
-        """Import a command; None if it is unknown."""
+        """Import a command; None if it is unknown.
+
+        Raises:
+            ClickException: Its add-on is not installed.
+        """
         if cmd_name not in COMMANDS:
             return None
-        module = importlib.import_module(f"{__name__}.{cmd_name}")
+        package, _ = COMMANDS[cmd_name]
+        module = add_ons.load(f"{package}.cli.{cmd_name}", f"quad {cmd_name}")
         command: click.Command = getattr(module, cmd_name)
         return command
 

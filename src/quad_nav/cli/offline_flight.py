@@ -10,8 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
-from quad_nav.cli import EXIT_INTERRUPTED
-from quad_web.cli.flight_page import FlightPage
+from quad_nav.cli import EXIT_INTERRUPTED, add_ons
 from quad_nav.cli.options import (
     LIVE,
     echo,
@@ -66,7 +65,7 @@ def fly_mission(
         )
         options = _options(**given)
         setup = read_setup(options)
-        page = FlightPage(**served) if web else None
+        page = _page(served) if web else None
     while True:
         with exit_on_faults():
             drawn = FlightPictures(setup, report, pictures, animate)
@@ -84,7 +83,12 @@ def fly_mission(
     sys.exit(status)
 
 
-def _is_wanted_again(page: FlightPage) -> bool:
+def _page(options: Mapping[str, Any]) -> Any:
+    """Return the ``FlightPage`` of the add-on."""
+    return add_ons.load("quad_web.cli.flight_page", "--web").FlightPage(**options)
+
+
+def _is_wanted_again(page: Any) -> bool:
     """Keep the page until Ctrl-C; return true if people want the flight again."""
     with _StopOnSignal() as stop:
         return page.wants_flight(lambda: bool(stop.stop_reason))
@@ -146,7 +150,7 @@ def _fly(
     pictures: FlightPictures,
     quiet: bool,
     processes: Optional[int],
-    page: Optional[FlightPage],
+    page: Optional[Any],
 ) -> int:
     processes = processes or processes_for(len(setup.robots))
     bar: List[FlightObserver] = [] if quiet else [ProgressBar()]

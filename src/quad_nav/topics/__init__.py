@@ -5,5 +5,5 @@ Each shell converts these plain objects into its own message classes.
 Reading order: `flight_info` (JSON texts and contacts), `markers` (scene, quadcopters and goals),
 `publishing` (what to publish of costmaps and paths, and when), `health` (diagnostics),
 `validation` (accept or reject incoming messages), `rviz_file` (the RViz configuration),
-`goal_routing` (who gets a goal of the fleet).
+`goal_routing` (who gets a goal of the fleet), `vehicle_states` (what a real vehicle does).
 """

@@ -10,7 +10,6 @@ from typing import Any, List, Optional, Sequence, Tuple
 import yaml
 
 from quad_nav.cli import EXIT_FAILURE, EXIT_SUCCESS
-from quad_tune.cli.flights_bar import run_with_bar
 from quad_nav.cli.options import (
     echo,
     echo_lines,
@@ -19,9 +18,10 @@ from quad_nav.cli.options import (
 )
 from quad_nav.cli.outputs import Outputs
 from quad_nav.cli.progress import processes_text
-from quad_tune.cli.study_course import course_of, workers_of
 from quad_nav.errors import InputError
 from quad_nav.files import plain_yaml
+from quad_tune.cli.flights_bar import run_with_bar
+from quad_tune.cli.study_course import course_of, workers_of
 from quad_tune.flight_cache import FlightCache
 from quad_tune.sweep import (
     Point,

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any, Optional, Tuple
 
 from quad_nav.cli import EXIT_SUCCESS
-from quad_tune.cli.flights_bar import run_with_bar
 from quad_nav.cli.options import echo, echo_lines, exit_on_faults, show_warnings
 from quad_nav.cli.outputs import Outputs
 from quad_nav.cli.progress import processes_text
-from quad_tune.cli.study_course import course_of, missions_of, workers_of
 from quad_nav.offline.workers import Workers
+from quad_tune.cli.flights_bar import run_with_bar
+from quad_tune.cli.study_course import course_of, missions_of, workers_of
 from quad_tune.search import SearchOptions
 from quad_tune.study_files import write_result
 from quad_tune.study_text import format_value, text

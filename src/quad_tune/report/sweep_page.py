@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from quad_nav.report.page import Page, Section, picture, render
 from quad_nav.report.style import ALARM, QUIET, colour, label_log, new_figure
+from quad_nav.versions import versions
 from quad_tune.report.sweep_measures import (
     EXPLANATIONS,
     MEASURES,
@@ -26,7 +27,6 @@ from quad_tune.report.sweep_measures import (
 from quad_tune.report.sweep_plot import sweep_plot
 from quad_tune.study_text import format_value
 from quad_tune.sweep import SweepRow, SweepSetup
-from quad_nav.versions import versions
 
 _COLUMNS = 2
 _MAX_NUMBERS = 100  # largest map with numbers in its cells

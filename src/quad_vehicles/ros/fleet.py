@@ -28,14 +28,14 @@ from quad_nav.files.values import (
     value_faults,
 )
 from quad_nav.ros.common.readiness import init_node
-from quad_vehicles.ros.node import LAND_ALL_TOPIC
-from quad_vehicles.ros.scene_topics import SceneLidars, SceneTopics
-from quad_vehicles.ros.simulated import TICK_S, SimulatedVehicles, starts_of
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.scene_file import load_scene, outside_problem
 from quad_nav.topics.flight_info import EVENTS_TOPIC, from_text
-from quad_vehicles.orders import IN_FLIGHT, ON_GROUND, State
+from quad_nav.topics.vehicle_states import IN_FLIGHT, ON_GROUND, State
+from quad_vehicles.ros.node import LAND_ALL_TOPIC
+from quad_vehicles.ros.scene_topics import SceneLidars, SceneTopics
+from quad_vehicles.ros.simulated import TICK_S, SimulatedVehicles, starts_of
 from quad_vehicles.vehicle_file import Vehicle, load_vehicles
 
 READY_WAIT_S = 90.0

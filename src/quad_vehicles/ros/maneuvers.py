@@ -15,8 +15,9 @@ from move_base_msgs.msg import MoveBaseAction, MoveBaseFeedback, MoveBaseGoal, M
 
 from quad_nav.ros.common.nav_messages import pose_stamped
 from quad_nav.ros.common.polled_actions import PolledActionServer
+from quad_nav.topics.vehicle_states import ON_GROUND, State
 from quad_vehicles.link import VehicleLink
-from quad_vehicles.orders import ON_GROUND, Response, State
+from quad_vehicles.orders import Response
 from quad_vehicles.states import VehicleMachine
 
 FEEDBACK_PERIOD_S = 0.2

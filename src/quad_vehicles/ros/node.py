@@ -24,16 +24,17 @@ from quad_nav.mission.respawn import RESPAWNED
 from quad_nav.ros.common.conversions import twist_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings, publish_health
 from quad_nav.ros.common.readiness import init_node
-from quad_vehicles.ros.maneuvers import LAND, RESUMPTION, TAKE_OFF, Maneuver, ManeuverAction
-from quad_vehicles.ros.topics import MissionPause, VehicleTopics, vehicle_health
 from quad_nav.topics.health import Health
 from quad_nav.topics.validation import CommandLease, twist_problem
+from quad_nav.topics.vehicle_states import IN_FLIGHT, State
 from quad_vehicles import crazyflie_adapter
 from quad_vehicles.autopilots import AUTOPILOTS
 from quad_vehicles.crazyflie_link import CrazyflieLink
 from quad_vehicles.link import VehicleLink
 from quad_vehicles.mavlink_link import MavlinkLink
-from quad_vehicles.orders import IN_FLIGHT, Permissions, Response, State
+from quad_vehicles.orders import Permissions, Response
+from quad_vehicles.ros.maneuvers import LAND, RESUMPTION, TAKE_OFF, Maneuver, ManeuverAction
+from quad_vehicles.ros.topics import MissionPause, VehicleTopics, vehicle_health
 from quad_vehicles.safety import COMMAND_HOVER_S
 from quad_vehicles.states import VehicleMachine
 from quad_vehicles.telemetry import Estimate

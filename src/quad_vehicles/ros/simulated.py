@@ -26,12 +26,12 @@ from quad_nav.ros.common.conversions import (
     transform_message,
 )
 from quad_nav.ros.simulator.commands import Commands
-from quad_vehicles.ros.scene_topics import PoseListener
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.simulation import STEPS_PER_S, Simulation
 from quad_nav.topics.flight_info import CONTACT_STATUS, contact_values
+from quad_vehicles.ros.scene_topics import PoseListener
 from quad_vehicles.vehicle_file import Vehicle
 
 STEPS_PER_TICK = 4

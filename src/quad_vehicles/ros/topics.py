@@ -25,7 +25,7 @@ from quad_nav.ros.common.conversions import (
     transform_message,
 )
 from quad_nav.topics.health import Health, Level
-from quad_vehicles.orders import IN_FLIGHT, ON_GROUND, State
+from quad_nav.topics.vehicle_states import IN_FLIGHT, ON_GROUND, State
 from quad_vehicles.states import VehicleMachine
 from quad_vehicles.telemetry import Estimate, Landed
 from quad_vehicles.vehicle_file import Vehicle

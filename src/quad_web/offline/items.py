@@ -22,9 +22,9 @@ from quad_nav.loop.inspection import (
 )
 from quad_nav.mission.sequencer import Sequencer
 from quad_nav.offline.flight import Flight
-from quad_web.offline.actions import HAS_ENDED, FlightActions
 from quad_nav.sim.contacts import Contact
 from quad_nav.topics.tracked_obstacles import track_rows
+from quad_web.offline.actions import HAS_ENDED, FlightActions
 from quad_web.view import rows
 from quad_web.view.cells import cell_items
 from quad_web.view.items import (

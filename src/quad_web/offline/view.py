@@ -14,12 +14,12 @@ from typing import Callable, Deque, List, Optional, Protocol, Tuple
 
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
 from quad_nav.offline.flight import Flight, FlightObserver
-from quad_web.offline.actions import FlightActions
-from quad_web.offline.items import FlightItems
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.pacing import RateMeter
-from quad_web.view.state import MAX_EVENTS, Wanted
+from quad_web.offline.actions import FlightActions
+from quad_web.offline.items import FlightItems
 from quad_web.process import Batch, Call
+from quad_web.view.state import MAX_EVENTS, Wanted
 
 PERIOD_S = 0.1
 FULL_SPEED_PERIOD_S = 0.35

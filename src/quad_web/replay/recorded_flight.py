@@ -17,6 +17,9 @@ from quad_nav.geometry import Pose2D, Scan
 from quad_nav.recording.bag_file import Progress, no_progress
 from quad_nav.recording.bag_index import RecordingIndex
 from quad_nav.recording.bag_trace import read_recording
+from quad_nav.sim.lidar import base_from_lidar
+from quad_nav.topics.markers import OBSTACLES_TOPIC
+from quad_nav.topics.tracked_obstacles import MARKERS_TOPIC, rows_of_markers
 from quad_web.replay.recorded_costmaps import CostmapTrack
 from quad_web.replay.recorded_obstacles import ObstacleTrack
 from quad_web.replay.recorded_robot import (
@@ -26,9 +29,6 @@ from quad_web.replay.recorded_robot import (
     decision_of,
     events_of,
 )
-from quad_nav.sim.lidar import base_from_lidar
-from quad_nav.topics.markers import OBSTACLES_TOPIC
-from quad_nav.topics.tracked_obstacles import MARKERS_TOPIC, rows_of_markers
 from quad_web.view import rows
 from quad_web.view.cells import cell_items
 from quad_web.view.items import (

@@ -12,8 +12,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from numpy.typing import NDArray
 
 from quad_nav.errors import excerpt
-from quad_web.ros.intake import Newest, Topic
 from quad_nav.topics.health import Level
+from quad_web.ros.intake import Newest, Topic
 from quad_web.view.state import Item
 
 LOST_AFTER_S = 3.0

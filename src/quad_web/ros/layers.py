@@ -18,11 +18,11 @@ from quad_nav.grid import GridSpec
 from quad_nav.ros.common.conversions import ScanMessage, scan_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.packed_messages import read_path
+from quad_nav.topics.tracked_obstacles import MARKERS_TOPIC, rows_of_markers
+from quad_nav.topics.validation import grid_problem, path_problem, scan_problem
 from quad_web.ros.frames import Frames
 from quad_web.ros.intake import Newest, Topic, decoded, raw_type
 from quad_web.ros.poses import MAP, Bodies
-from quad_nav.topics.tracked_obstacles import MARKERS_TOPIC, rows_of_markers
-from quad_nav.topics.validation import grid_problem, path_problem, scan_problem
 from quad_web.view.items import costmap_item, line_item, scan_item, track_item
 from quad_web.view.state import OF_ONE_ROBOT, Item
 

@@ -19,8 +19,8 @@ from quad_nav.files.values import Rule, is_whole, value_faults
 from quad_nav.ros.common.readiness import init_node, server_parameters
 from quad_web.ros.actions import FlightActions
 from quad_web.ros.source import FlightSource
-from quad_web.view.state import FleetState
 from quad_web.server import Server, Urls, WebOptions
+from quad_web.view.state import FleetState
 
 EXIT_BAD_INPUT = 2
 DEFAULTS: Dict[str, Any] = {

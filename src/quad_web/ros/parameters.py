@@ -24,8 +24,8 @@ from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest
 from quad_nav import config
 from quad_nav.config import Configuration
 from quad_nav.errors import InputError, excerpt
-from quad_web.ros.calls import PATIENCE_S, CallFailed, call, in_threads
 from quad_nav.sim.scene import BODY_RADIUS_M
+from quad_web.ros.calls import PATIENCE_S, CallFailed, call, in_threads
 from quad_web.view.actions import Answer, ParameterView
 
 _SERVICE = "/set_parameters"

@@ -17,9 +17,9 @@ from quad_nav.ros.common.conversions import odometry_from_message, time_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.packed_messages import STATES_TOPIC, States, StatesMessage, StatesReader
 from quad_nav.ros.common.rospy_repairs import set_time
+from quad_nav.topics.validation import odometry_problem, valid_states
 from quad_web.ros.frames import Frames
 from quad_web.ros.intake import Newest, Topic
-from quad_nav.topics.validation import odometry_problem, valid_states
 from quad_web.view.items import UNKNOWN_BODY, body_row
 
 MAP = "map"

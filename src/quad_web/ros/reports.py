@@ -18,7 +18,6 @@ from quad_nav.files.values import is_number, is_whole
 from quad_nav.geometry import Pose2D, yaw_from_quaternion
 from quad_nav.peers.right_of_way import Yield, YieldDecision
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
-from quad_web.ros.intake import Newest, Topic
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.scene_file import scene_from_document
@@ -39,6 +38,7 @@ from quad_nav.topics.right_of_way import (
     right_of_way_from_values,
 )
 from quad_nav.topics.validation import MAX_MAGNITUDE
+from quad_web.ros.intake import Newest, Topic
 from quad_web.view.state import FleetState
 
 MAX_CONTACTS, MAX_GOALS, MAX_TEXT = 500, 20_000, 500

@@ -11,6 +11,7 @@ import rospy
 
 from quad_nav.geometry import Pose2D
 from quad_nav.ros.simulator.topics import FASTEST_RATE
+from quad_nav.scenario.rules import START_S
 from quad_web.ros.frames import Frames
 from quad_web.ros.health import LOST_AFTER_S, FleetHealth
 from quad_web.ros.intake import Subscriptions
@@ -19,7 +20,6 @@ from quad_web.ros.obstacles import Obstacles
 from quad_web.ros.parameters import NavigatorTrees
 from quad_web.ros.poses import Bodies
 from quad_web.ros.reports import FlightReports
-from quad_nav.scenario.rules import START_S
 from quad_web.view import rows
 from quad_web.view.cells import cell_items
 from quad_web.view.items import Trails, poses_item, robots_item, scene_item

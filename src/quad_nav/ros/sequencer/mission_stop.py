@@ -21,7 +21,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from quad_nav.ros.sequencer.robot import MissionRobot
-from quad_vehicles.orders import ON_GROUND, State
+from quad_nav.topics.vehicle_states import ON_GROUND, State
 
 ALL = "/mission"
 STOP_SERVICE, RESUME_SERVICE = f"{ALL}/stop", f"{ALL}/resume"
