@@ -2,20 +2,52 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Dict, List, Sequence, Tuple
+from typing import Any, ClassVar, Dict, List, Sequence, Tuple
 
 from quad_bench.barn.protocol import SAMPLE_STEP, TIME_LIMIT_S, Outcome, Run, metric
 from quad_bench.barn.setup import BarnOptions, Contestant, flight_setup, read_barn_setup
-from quad_bench.barn.statistics import BarnStatistics, barn_statistics
+from quad_bench.barn.statistics import barn_statistics
 from quad_bench.barn.worlds import BarnWorld
 from quad_nav.config.sources import source_paths
 from quad_nav.errors import InputError
+from quad_nav.report.results import interval_text, number_text, percent
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_tune.courses import HELD_OUT_SEED, LIDAR, Case, files_digest
+from quad_tune.evaluation import ProtocolStatistics
 from quad_tune.flight_result import FlightResult
 from quad_tune.space import Assignments
+
+COLUMNS = (
+    "flights",
+    "success\n(%)",
+    "95 %\ninterval",
+    "collision\n(%)",
+    "time-out\n(%)",
+    "mean\ntime (s)",
+    "metric",
+)
+
+
+@dataclass(frozen=True)
+class BarnCourseOptions(BarnOptions):
+    """Options of BARN's worlds as a course."""
+
+    space: ClassVar[str] = "barn.yaml"
+
+    def with_config(self, name: str) -> BarnCourseOptions:
+        """Return the same course with another base and no parameters on top."""
+        return replace(self, config=name, parameters=())
+
+    def read(self) -> Tuple[BarnCourse, List[str]]:
+        """Read the worlds; return the course and its warnings.
+
+        Raises:
+            InputError: The worlds or the parameters are invalid.
+        """
+        course = BarnCourse(self)
+        return course, course.warnings
 
 
 class BarnCourse:
@@ -105,14 +137,26 @@ class BarnCourse:
             "body_radius_m": given.body_radius_m,
         }
 
-    def statistics(self, cases: Sequence[Case], flights: Sequence[FlightResult]) -> BarnStatistics:
+    def protocol_statistics(
+        self, cases: Sequence[Case], flights: Sequence[FlightResult]
+    ) -> ProtocolStatistics:
         """Compute the benchmark's statistics of flights."""
-        return barn_statistics(
+        found = barn_statistics(
             [
                 run_of(self._worlds[case.course], case, flight)
                 for case, flight in zip(cases, flights)
             ]
         )
+        cells = (
+            str(found.runs),
+            percent(found.successes, found.runs),
+            interval_text(found.success_interval),
+            percent(found.collisions, found.runs),
+            percent(found.time_outs, found.runs),
+            number_text(found.mean_time_s),
+            f"{found.metric:.3f}",
+        )
+        return ProtocolStatistics("barn", COLUMNS, cells, asdict(found))
 
     def _cases(self, numbers: Sequence[int], seed: int, count: int) -> Tuple[Case, ...]:
         return tuple(

@@ -7,13 +7,14 @@ import json
 import math
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, ClassVar, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.config.sources import source_paths
 from quad_nav.errors import InputError
 from quad_nav.mission.robot_goals import WatchedGoalFile
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.sim.simulation import SimulationParams
+from quad_tune.flight_result import FlightResult
 from quad_tune.space import Assignments, costmap_paths
 
 HELD_OUT_SEED = 1_000_000
@@ -80,6 +81,20 @@ class MissionOptions:
     time_limit_s: float = 300.0
     scans_per_s: float = 20.0
     simulation: SimulationParams = SimulationParams(jitter_m=0.3)
+
+    space: ClassVar[str] = "default.yaml"
+
+    def with_config(self, name: str) -> MissionOptions:
+        """Return the same course with another base and no parameters on top."""
+        return replace(self, config=name, parameters=())
+
+    def read(self) -> Tuple[MissionCourse, List[str]]:
+        """Check every mission; return the course and its warnings.
+
+        Raises:
+            InputError: Lists every fault.
+        """
+        return MissionCourse(self), check_missions(self)
 
 
 class MissionCourse:
@@ -148,6 +163,9 @@ class MissionCourse:
             "scans_per_s": given.scans_per_s,
             "simulation": asdict(given.simulation),
         }
+
+    def protocol_statistics(self, cases: Sequence[Case], flights: Sequence[FlightResult]) -> None:
+        """Return None: missions have no protocol of their own."""
 
 
 def check_missions(options: MissionOptions) -> List[str]:

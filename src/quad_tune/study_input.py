@@ -2,41 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, List, Sequence, Tuple, Union
 
-from quad_bench.barn.setup import BarnOptions
 from quad_nav import config
 from quad_nav.config.files import set_value
 from quad_nav.config.notes import without_effect
 from quad_nav.config.robot_tree import RobotSource, fitted, unfitted_tree
 from quad_nav.errors import InputError
-from quad_tune.barn_course import BarnCourse
-from quad_tune.courses import MissionCourse, MissionOptions, check_missions
-from quad_tune.evaluation import Course
 from quad_tune.space import costmap_paths
-
-CourseOptions = Union[MissionOptions, BarnOptions]
-
-
-def read_course(given: CourseOptions) -> Tuple[Course, Sequence[str]]:
-    """Create the course of the options and return it with its warnings.
-
-    Raises:
-        InputError: Lists every fault.
-    """
-    if isinstance(given, BarnOptions):
-        barn = BarnCourse(given)
-        return barn, barn.warnings
-    return MissionCourse(given), check_missions(given)
-
-
-def with_config(given: CourseOptions, name: str) -> CourseOptions:
-    """Return the same course with another base and no parameters on top."""
-    if isinstance(given, BarnOptions):
-        return replace(given, config=name, parameters=())
-    return replace(given, config=name, parameters=())
 
 
 def parameter_faults(

@@ -7,8 +7,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import tabulate
 
-from quad_bench.barn.statistics import BarnStatistics
-from quad_tune.barn_course import BarnCourse
+from quad_tune.evaluation import ProtocolStatistics
 from quad_tune.parameter_files import Change, base_configuration, base_value
 from quad_tune.refinement import Gain
 from quad_tune.score import TERMS
@@ -38,16 +37,6 @@ _HEADER = [
     "min\ngap (m)",
     "roughness\n(m/s2)",
     "cost",
-]
-_BARN_HEADER = [
-    "",
-    "flights",
-    "success\n(%)",
-    "95 %\ninterval",
-    "collision\n(%)",
-    "time-out\n(%)",
-    "mean\ntime (s)",
-    "metric",
 ]
 
 
@@ -110,16 +99,17 @@ def held_out_table(result: TuneResult, tablefmt: str = "simple") -> str:
             colalign=("left",) + ("right",) * 7,
         )
     ]
-    barn = barn_rows(result)
-    if barn:
+    rows = protocol_rows(result)
+    if rows:
+        columns = rows[0][1].columns
         tables.append(
             "By the benchmark's protocol:\n\n"
             + tabulate.tabulate(
-                [barn_row(name, statistics) for name, statistics in barn],
-                _header(_BARN_HEADER, tablefmt),
+                [(name, *statistics.cells) for name, statistics in rows],
+                _header(["", *columns], tablefmt),
                 tablefmt=tablefmt,
                 disable_numparse=True,
-                colalign=("left",) + ("right",) * 7,
+                colalign=("left",) + ("right",) * len(columns),
             )
         )
     return "\n\n".join(tables)
@@ -133,33 +123,14 @@ def held_out_rows(result: TuneResult) -> Tuple[Tuple[str, FlightStatistics], ...
     )
 
 
-def barn_rows(result: TuneResult) -> Tuple[Tuple[str, BarnStatistics], ...]:
-    """Return the benchmark's statistics of the same flights; empty for other courses."""
+def protocol_rows(result: TuneResult) -> Tuple[Tuple[str, ProtocolStatistics], ...]:
+    """Return a benchmark's own statistics of the same flights; empty for other courses."""
     course, held_out = result.setup.course, result.held_out
-    if not isinstance(course, BarnCourse):
-        return ()
-    return tuple(
-        (name, course.statistics(held_out.cases, flights))
+    found = [
+        (name, course.protocol_statistics(held_out.cases, flights))
         for name, flights in held_out.sets(course.config)
-    )
-
-
-def barn_row(name: str, statistics: BarnStatistics) -> List[str]:
-    """Format a row of the benchmark's table."""
-    low, high = statistics.success_interval
-    rates = [
-        f"{100 * count / statistics.runs:.1f}"
-        for count in (statistics.successes, statistics.collisions, statistics.time_outs)
     ]
-    return [
-        name,
-        str(statistics.runs),
-        rates[0],
-        f"{100 * low:.1f}-{100 * high:.1f}",
-        *rates[1:],
-        _figure(statistics.mean_time_s, 1),
-        f"{statistics.metric:.3f}",
-    ]
+    return tuple((name, statistics) for name, statistics in found if statistics is not None)
 
 
 def statistics_row(name: str, statistics: FlightStatistics) -> List[str]:
@@ -282,7 +253,7 @@ def format_value(value: Any) -> str:
 def to_json(result: TuneResult, command: str) -> Dict[str, Any]:
     """Convert the outcome to JSON data."""
     setup, held_out = result.setup, result.held_out
-    found = {
+    found: Dict[str, Any] = {
         "command": command,
         "versions": all_versions(),
         "seed": setup.options.search.seed,
@@ -308,8 +279,8 @@ def to_json(result: TuneResult, command: str) -> Dict[str, Any]:
             for k, case in enumerate(held_out.cases)
         ],
     }
-    if isinstance(setup.course, BarnCourse):
-        found["barn"] = {name: asdict(statistics) for name, statistics in barn_rows(result)}
+    for name, statistics in protocol_rows(result):
+        found.setdefault(statistics.benchmark, {})[name] = statistics.data
     return found
 
 

@@ -19,13 +19,13 @@ from quad_nav.files.user_files import read_text
 from quad_nav.offline.workers import Workers
 from quad_nav.versions import versions
 from quad_tune.courses import LIDAR, Case, identity_text
-from quad_tune.evaluation import Course, Evaluation, StudyObserver, task_of
+from quad_tune.evaluation import Course, CourseOptions, Evaluation, StudyObserver, task_of
 from quad_tune.flight_cache import FlightCache
 from quad_tune.flight_result import FlightResult
 from quad_tune.space import Dimension, SearchSpace
 from quad_tune.statistics import FlightStatistics, flight_statistics
 from quad_tune.study_database import NotStored
-from quad_tune.study_input import CourseOptions, parameter_faults, read_course
+from quad_tune.study_input import parameter_faults
 
 _BASE = "base"
 _NAME = "sweep"
@@ -127,7 +127,7 @@ def read_sweep_setup(options: SweepOptions) -> SweepSetup:
     Raises:
         InputError: Lists every fault.
     """
-    course, warnings = read_course(options.course)
+    course, warnings = options.course.read()
     space = space_of(options.points)
     (case,) = course.search_cases(1)
     problems: List[str] = []

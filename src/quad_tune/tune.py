@@ -9,7 +9,6 @@ from typing import Any, Dict, Mapping, Optional, Sequence, Tuple
 import optuna
 from optuna.trial import FrozenTrial
 
-from quad_bench.barn.setup import BarnOptions
 from quad_nav import config
 from quad_nav.config.plugins import plugin_name
 from quad_nav.errors import InputError, QuadError
@@ -17,7 +16,7 @@ from quad_nav.files.shipped import shipped
 from quad_nav.offline.workers import Workers
 from quad_nav.versions import versions
 from quad_tune.courses import Case
-from quad_tune.evaluation import Course, Evaluation, StudyObserver
+from quad_tune.evaluation import Course, CourseOptions, Evaluation, StudyObserver
 from quad_tune.flight_result import FlightResult
 from quad_tune.parameter_files import base_configuration, base_value
 from quad_tune.refinement import BASE, Refinement, refine, refinement_flights
@@ -27,7 +26,7 @@ from quad_tune.space import Assignments, SearchSpace, load_space
 from quad_tune.statistics import Comparison, compare
 from quad_tune.study import TuneStudy, open_study
 from quad_tune.study_database import NotStored
-from quad_tune.study_input import CourseOptions, parameter_faults, read_course, with_config
+from quad_tune.study_input import parameter_faults
 
 TUNED = "tuned"
 _DWA = "DWAPlannerROS"
@@ -163,10 +162,8 @@ def read_tune_setup(options: TuneOptions) -> TuneSetup:
     Raises:
         InputError: Lists every fault.
     """
-    course, warnings = read_course(options.course)
-    against = tuple(
-        (name, read_course(with_config(options.course, name))[0]) for name in options.against
-    )
+    course, warnings = options.course.read()
+    against = tuple((name, options.course.with_config(name).read()[0]) for name in options.against)
     configuration = base_configuration(course.config, course.fixed)
     given = load_space(options.space or _shipped_space(options.course, configuration)).without(
         [path for path, _ in course.fixed]
@@ -308,4 +305,4 @@ def start_values(space: SearchSpace, base: Mapping[str, Any]) -> Dict[str, Any]:
 def _shipped_space(course: CourseOptions, configuration: config.Configuration) -> Path:
     if plugin_name(configuration.navigator.base_local_planner) == _DWA:
         return shipped("spaces", "dwa.yaml")
-    return shipped("spaces", "barn.yaml" if isinstance(course, BarnOptions) else "default.yaml")
+    return shipped("spaces", course.space)

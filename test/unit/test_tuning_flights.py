@@ -167,11 +167,13 @@ def test_a_flight_through_barn_counts_as_the_benchmark_counts_it(tmp_path):
     setup = read_barn_setup(BarnOptions(path, only=(0,)))
     run = fly_world(setup.contestant, setup.worlds[0], 0)
     assert run.outcome is Outcome.SUCCESS
-    found = course.statistics(cases, [flight])
-    assert (found.successes, found.mean_time_s, found.metric) == (1, run.time_s, run.metric)
-    touched = course.statistics(cases, [replace(flight, contacts=1)])
-    late = course.statistics(cases, [replace(flight, reached=0)])
-    assert (touched.collisions, late.time_outs, touched.metric, late.metric) == (1, 1, 0.0, 0.0)
+    found = course.protocol_statistics(cases, [flight]).data
+    assert found["successes"] == 1
+    assert (found["mean_time_s"], found["metric"]) == (run.time_s, run.metric)
+    touched = course.protocol_statistics(cases, [replace(flight, contacts=1)]).data
+    late = course.protocol_statistics(cases, [replace(flight, reached=0)]).data
+    assert (touched["collisions"], late["time_outs"]) == (1, 1)
+    assert touched["metric"] == late["metric"] == 0.0
 
 
 def test_the_front_holds_what_nothing_beats_in_both():

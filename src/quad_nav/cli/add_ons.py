@@ -28,13 +28,12 @@ def load(module: str, wanted: str) -> Any:
     Raises:
         ClickException: The add-on is not installed; the message says how to install it.
     """
-    package = module.partition(".")[0]
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError as error:
-        if error.name != package:
+        if error.name not in EXTRAS:
             raise
         raise click.ClickException(
-            f"{wanted}: the add-on {package} is not installed; "
-            f"install it with: pip install 'quad-nav[{EXTRAS[package]}]'"
+            f"{wanted}: the add-on {error.name} is not installed; "
+            f"install it with: pip install 'quad-nav[{EXTRAS[error.name]}]'"
         ) from error

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, Optional, Sequence, Tuple, Union
+from typing import Any, Optional, Sequence, Tuple
 
-from quad_bench.barn.setup import BarnOptions
+from quad_nav.cli import add_ons
 from quad_nav.cli.options import parameter
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
@@ -14,6 +14,7 @@ from quad_nav.offline.workers import LocalWorkers, RayWorkers, Workers
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.simulation import SimulationParams
 from quad_tune.courses import Mission, MissionOptions
+from quad_tune.evaluation import CourseOptions
 
 
 def course_of(
@@ -27,7 +28,7 @@ def course_of(
     body_radius_m: float,
     held_out: Tuple[Mission, ...] = (),
     **given: Any,
-) -> Union[MissionOptions, BarnOptions]:
+) -> CourseOptions:
     """Convert the options to a course, without reading its files.
 
     Raises:
@@ -42,7 +43,11 @@ def course_of(
                     "held-out missions"
                 ]
             )
-        return BarnOptions(worlds, config or "barn", fixed, seed=seed, body_radius_m=body_radius_m)
+        barn_course = add_ons.load("quad_tune.barn_course", "--worlds")
+        options: CourseOptions = barn_course.BarnCourseOptions(
+            worlds, config or "barn", fixed, seed=seed, body_radius_m=body_radius_m
+        )
+        return options
     missions = missions_of(scenes, goals, "")
     if is_random:
         missions += (Mission(),)

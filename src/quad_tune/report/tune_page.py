@@ -41,7 +41,7 @@ def tune_page(result: TuneResult, before: FlightTrace, after: FlightTrace, comma
         result=result,
         command=command,
         rows=study_text.held_out_rows(result),
-        barn=study_text.barn_rows(result),
+        protocol=study_text.protocol_rows(result),
         verdict=study_text.verdict(result),
         lines=[line.rstrip(".") for line in study_text.held_out_lines(result)],
         interval_text=study_text.INTERVAL_TEXT,
