@@ -44,7 +44,7 @@ lint: venv  ## ruff, mypy and the structure of the sources
 	$(PYTHON) -m ruff format --check
 	$(PYTHON) -m ruff check
 	$(PYTHON) -m mypy
-	$(PYTHON) -m pytest -q test/unit/test_structure.py test/unit/test_imports.py
+	$(PYTHON) -m pytest -q test/project/test_structure.py test/project/test_imports.py
 
 # The PATH has ruff, which formats the signatures. The variable silences an advertisement.
 docs: venv  ## The documentation as a site, in site/; warnings are errors

@@ -21,7 +21,8 @@ from quad_nav.geometry import Pose2D
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Box, Cylinder, Obstacle, Scene, Walls
 from quad_nav.sim.scene_file import load_scene
-from quad_nav.sim.simulation import LIDAR_CASTERS, Simulation, SimulationParams
+from quad_nav.sim.simulation import Simulation
+from quad_nav.sim.simulation_params import LIDAR_CASTERS, SimulationParams
 
 ROOT = Path(__file__).resolve().parents[1]
 BEAMS = LidarParams().beam_count

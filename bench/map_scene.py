@@ -18,7 +18,8 @@ from PIL import Image
 from quad_nav.files.document import read_yaml
 from quad_nav.sim.map_file import load_map
 from quad_nav.sim.scene_file import load_scene
-from quad_nav.sim.simulation import STEPS_PER_S, Simulation
+from quad_nav.sim.simulation import Simulation
+from quad_nav.sim.simulation_params import STEPS_PER_S
 
 OCCUPIED, UNKNOWN, FREE = 0, 205, 254
 

@@ -30,7 +30,8 @@ from quad_nav.navigator.navigator import Navigator
 from quad_nav.scenario.assembly import build_navigator
 from quad_nav.sim.lidar import Scan, base_from_lidar
 from quad_nav.sim.scene_file import load_scene
-from quad_nav.sim.simulation import STEPS_PER_S, Simulation
+from quad_nav.sim.simulation import Simulation
+from quad_nav.sim.simulation_params import STEPS_PER_S
 
 ROOT = Path(__file__).resolve().parents[1]
 GOAL = Pose2D(9.0, 5.5)

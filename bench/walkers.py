@@ -42,7 +42,7 @@ from quad_nav.scenario.random_mission import RandomMission
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.motion import Walkers
 from quad_nav.sim.scene import Scene, Walls
-from quad_nav.sim.simulation import SimulationParams
+from quad_nav.sim.simulation_params import SimulationParams
 
 HALLWAY = re.compile(r"(\d+)hallway")
 HALLWAY_M = 24.0, 4.0

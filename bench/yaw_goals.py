@@ -30,7 +30,7 @@ from quad_nav.offline.run import fly
 from quad_nav.offline.workers import LocalWorkers, fly_all
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.scenario.warm_up import simulate, warm_up
-from quad_nav.sim.simulation import SimulationParams
+from quad_nav.sim.simulation_params import SimulationParams
 
 JITTER_M = 0.3
 TIME_LIMIT_S = 1200.0

@@ -13,7 +13,7 @@ from quad_nav.config.sources import source_paths
 from quad_nav.errors import InputError
 from quad_nav.mission.robot_goals import WatchedGoalFile
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
-from quad_nav.sim.simulation import SimulationParams
+from quad_nav.sim.simulation_params import SimulationParams
 from quad_tune.flight_result import FlightResult
 from quad_tune.space import Assignments, costmap_paths
 

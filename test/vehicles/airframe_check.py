@@ -21,7 +21,8 @@ import numpy as np
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.sim.flight import Airframe, AutopilotResponse
 from quad_nav.sim.scene import Scene, Walls
-from quad_nav.sim.simulation import STEPS_PER_S, Simulation, SimulationParams
+from quad_nav.sim.simulation import Simulation
+from quad_nav.sim.simulation_params import STEPS_PER_S, SimulationParams
 
 LOGS = {"random_commands": (0.031, 0.1), "velocity_steps": (0.031, 0.069)}
 """Largest root mean square errors, m/s and rad/s.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from quad_nav.sim.simulation import STEP_S
+from quad_nav.sim.simulation_params import STEP_S
 
 DELAY_S, FREQUENCY_RADPS, DAMPING = 0.087, 4.8, 0.62
 _TAKE_OFF_MPS2, _PEAK_M, _SETTLE_M, _SETTLE_S = 0.7, 0.034, 0.043, 0.45

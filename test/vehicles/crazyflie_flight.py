@@ -10,7 +10,7 @@ from vehicles.stand_in import advance
 from vehicles.virtual_flight import STARTS
 
 from quad_nav.geometry import Twist2D
-from quad_nav.sim.simulation import STEP_S
+from quad_nav.sim.simulation_params import STEP_S
 from quad_nav.topics.vehicle_states import State
 from quad_vehicles.crazyflie_adapter import TRAITS, CrazyflieAdapter
 from quad_vehicles.orders import Permissions

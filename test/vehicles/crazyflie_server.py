@@ -22,7 +22,7 @@ from vehicles.stand_in import advance
 
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.scene_file import load_scene
-from quad_nav.sim.simulation import STEP_S
+from quad_nav.sim.simulation_params import STEP_S
 
 APART_M = 20.0
 PROTOCOL = 9  # from 9 on a yaw rate is counter-clockwise

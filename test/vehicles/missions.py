@@ -35,7 +35,8 @@ from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.mission.summary import summarize
 from quad_nav.offline.flight import Flight
 from quad_nav.sim.flight import AIRFRAMES, BodyState
-from quad_nav.sim.simulation import STEP_S, Simulation
+from quad_nav.sim.simulation import Simulation
+from quad_nav.sim.simulation_params import STEP_S
 from quad_nav.topics.vehicle_states import State
 from quad_vehicles import crazyflie_adapter
 from quad_vehicles.autopilots import AUTOPILOTS

@@ -12,7 +12,7 @@ from collections import deque
 from vehicles.point_vehicle import DELAY_S, LAG_S, YAW_LAG_S
 
 from quad_nav.geometry import Pose2D, Pose3D
-from quad_nav.sim.simulation import STEP_S
+from quad_nav.sim.simulation_params import STEP_S
 
 GRAVITY_MPS2 = 9.81
 _AT_ORIGIN = (Pose2D(0.0, 0.0),)

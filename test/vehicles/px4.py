@@ -31,7 +31,7 @@ from vehicles.stand_in import (
 )
 
 from quad_nav.sim.flight import Airframe, AutopilotResponse
-from quad_nav.sim.simulation import STEP_S
+from quad_nav.sim.simulation_params import STEP_S
 
 REJECTED = 1  # MAV_RESULT_TEMPORARILY_REJECTED
 MANUAL, ALTCTL, POSCTL, OFFBOARD = (n << 16 for n in (1, 2, 3, 6))

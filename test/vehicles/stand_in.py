@@ -15,7 +15,7 @@ from types import SimpleNamespace
 from vehicles.estimator import Estimator, LocalFrame
 from vehicles.stand_in_messages import MESSAGES, Messages
 
-from quad_nav.sim.simulation import STEP_S
+from quad_nav.sim.simulation_params import STEP_S
 
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4

@@ -15,7 +15,7 @@ from vehicles.px4 import Px4
 from vehicles.stand_in import advance
 
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.sim.simulation import STEP_S as STEP
+from quad_nav.sim.simulation_params import STEP_S as STEP
 from quad_nav.topics.vehicle_states import State
 from quad_vehicles.autopilots import AUTOPILOTS
 from quad_vehicles.mavlink_adapter import MavlinkAdapter

@@ -21,7 +21,7 @@ from quad_nav.report.results import (
     versions_text,
     wrapped,
 )
-from quad_nav.sim.simulation import STEPS_PER_S
+from quad_nav.sim.simulation_params import STEPS_PER_S
 from quad_nav.versions import versions
 
 OUTCOME_HEADER = [

@@ -33,7 +33,7 @@ from quad_nav.scenario.rules import steps_per_scan
 from quad_nav.scenario.scenario import read_configurations
 from quad_nav.sim.flight import Airframe, FlightParams
 from quad_nav.sim.lidar import LidarParams
-from quad_nav.sim.simulation import SimulationParams
+from quad_nav.sim.simulation_params import SimulationParams
 
 LIDAR = LidarParams(
     math.radians(270.0),

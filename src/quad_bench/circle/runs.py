@@ -17,7 +17,8 @@ from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.offline.run import fly
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.robot_state import RobotStates
-from quad_nav.sim.simulation import STEPS_PER_S, Simulation
+from quad_nav.sim.simulation import Simulation
+from quad_nav.sim.simulation_params import STEPS_PER_S
 
 Floats = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from quad_nav.scenario.rules import MAX_ROBOTS, steps_per_scan
 from quad_nav.scenario.scenario import read_configurations
 from quad_nav.sim.flight import Airframe
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene, Walls
-from quad_nav.sim.simulation import SimulationParams
+from quad_nav.sim.simulation_params import SimulationParams
 from quad_nav.sim.start_poses import start_poses
 
 QUAD, ORCA, ORCA_POINTS = "quad", "orca", "orca-points"

@@ -40,7 +40,7 @@ from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Box, Cylinder, Scene, Sphere, Walls
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.sim.scene_writer import write_scene
-from quad_nav.sim.simulation import SimulationParams
+from quad_nav.sim.simulation_params import SimulationParams
 
 __all__ = [
     "TRAJECTORY_COLUMNS",

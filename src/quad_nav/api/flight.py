@@ -20,7 +20,7 @@ from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.flight import BodyState
 from quad_nav.sim.robot_state import RobotState
-from quad_nav.sim.simulation import STEPS_PER_S
+from quad_nav.sim.simulation_params import STEPS_PER_S
 
 Command = Twist2D
 """Velocity in ``base_link``: ``Command(vx_mps, vy_mps, vyaw_radps)``."""

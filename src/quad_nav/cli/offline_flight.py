@@ -35,7 +35,7 @@ from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setu
 from quad_nav.sim.flight import AIRFRAMES
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.odometry import OdomDrift
-from quad_nav.sim.simulation import SimulationParams
+from quad_nav.sim.simulation_params import SimulationParams
 
 _TUTORIAL_ROBOTS = 2
 _PAGE_OPTIONS = ("address", "port", "rate", "open_it")

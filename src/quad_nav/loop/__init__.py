@@ -29,7 +29,7 @@ from quad_nav.config import Configuration
 from quad_nav.peers.links import LinkOutages
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.sim.scene import Scene
-from quad_nav.sim.simulation import SimulationParams
+from quad_nav.sim.simulation_params import SimulationParams
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ from quad_nav.loop.worker_process import START_METHOD, WorkerProcess, WorkerProc
 from quad_nav.peers.peer import Intention
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.robot_state import RobotStates
-from quad_nav.sim.simulation import STEPS_PER_S, Simulation
+from quad_nav.sim.simulation import Simulation
+from quad_nav.sim.simulation_params import STEPS_PER_S
 from quad_nav.timing import is_due
 
 STEPS_PER_ODOMETRY = STEPS_PER_S // 40

@@ -35,7 +35,7 @@ from quad_nav.sim.casters import Lidars
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.odometry import OdomFrames, pose_in
 from quad_nav.sim.robot_state import RobotState, RobotStates
-from quad_nav.sim.simulation import STEPS_PER_S
+from quad_nav.sim.simulation_params import STEPS_PER_S
 from quad_nav.timing import is_due
 from quad_nav.tracking.tracker import ObstacleTracker
 

@@ -31,7 +31,7 @@ from quad_nav.peers.peer import Intention
 from quad_nav.sim.casters import Lidars, kernel_lidars
 from quad_nav.sim.flight import BODY_VALUES, BodyState
 from quad_nav.sim.robot_state import RobotStates
-from quad_nav.sim.simulation import STEPS_PER_S
+from quad_nav.sim.simulation_params import STEPS_PER_S
 from quad_nav.timing import is_due
 
 PROCESS_NAME = "navigators"

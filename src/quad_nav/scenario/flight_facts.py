@@ -19,7 +19,7 @@ from quad_nav.scenario.simulator_setup import DEFAULT_BEAMS
 from quad_nav.scenario.simulator_setup import DEFAULTS as SIMULATOR_DEFAULTS
 from quad_nav.sim.flight import airframe_name
 from quad_nav.sim.scene import Scene
-from quad_nav.sim.simulation import STEP_S
+from quad_nav.sim.simulation_params import STEP_S
 
 SHIPPED = "shipped"
 """Name of the goals of this package."""

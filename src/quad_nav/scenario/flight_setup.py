@@ -21,7 +21,7 @@ from quad_nav.scenario.rules import RANDOM, RULES, steps_per_scan
 from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configurations, read_scenario
 from quad_nav.scenario.scene_map import scene_map_problem
 from quad_nav.sim.scene import Scene
-from quad_nav.sim.simulation import SimulationParams
+from quad_nav.sim.simulation_params import SimulationParams
 from quad_nav.sim.start_poses import start_poses
 
 _RULES = {name: RULES[name] for name in ("lidar_rate", "jitter", "time_limit")}

@@ -17,7 +17,7 @@ from quad_nav.files.values import (
 )
 from quad_nav.sim.flight import AIRFRAMES
 from quad_nav.sim.odometry import MAX_DRIFT
-from quad_nav.sim.simulation import LIDAR_CASTERS, STEPS_PER_S
+from quad_nav.sim.simulation_params import LIDAR_CASTERS, STEPS_PER_S
 
 RANDOM = "random"
 """Value of ``scene`` and ``goals`` that asks for a random mission."""

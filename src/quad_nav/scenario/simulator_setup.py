@@ -22,7 +22,7 @@ from quad_nav.sim.flight import AIRFRAMES
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.odometry import OdomDrift
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
-from quad_nav.sim.simulation import SimulationParams
+from quad_nav.sim.simulation_params import SimulationParams
 from quad_nav.sim.start_poses import start_poses
 
 DEFAULT_BEAMS = 512

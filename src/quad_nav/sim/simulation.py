@@ -6,78 +6,28 @@ Time advances in steps of 1/240 s. Equal arguments and equal calls give bit-iden
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import List, Optional, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Scan, Twist2D
 from quad_nav.sim.autopilot import Autopilot, flight_params
 from quad_nav.sim.body import GoalSphere, World
 from quad_nav.sim.casters import Caster, KernelCaster, Lidars, WorldCaster
 from quad_nav.sim.contacts import Contact, ContactLog
-from quad_nav.sim.flight import Airframe, BodyState, FlightLaw, FlightParams, limit_command
+from quad_nav.sim.flight import BodyState, FlightLaw, limit_command
 from quad_nav.sim.free_flight import FreeFlight
-from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.movers import Movers
-from quad_nav.sim.odometry import OdomDrift, OdomFrames
+from quad_nav.sim.odometry import OdomFrames
 from quad_nav.sim.robot_state import RobotState, robot_state
 from quad_nav.sim.scene import Scene
+from quad_nav.sim.simulation_params import STEP_S, STEPS_PER_S, SimulationParams
 from quad_nav.sim.start_poses import start_poses
 
-STEPS_PER_S = 240
-STEP_S = 1.0 / STEPS_PER_S
-LIDAR_CASTERS = ("kernel", "bullet")
 _STEPS_NEAR = 12
 """Steps that the engine moves a quadcopter after it came near something, before a new check."""
-
-
-@dataclass(frozen=True)
-class SimulationParams:
-    """Parameters of a simulation, apart from the scene and the number of quadcopters.
-
-    A quadcopter hovers when its last command is older than ``command_timeout_s`` plus
-    ``controller_period_s``.
-
-    Attributes:
-        lidar: Beam pattern and noise.
-        flight: Limits of commands and gains of the flight controller.
-        airframe: Mass properties and size of the quadcopters.
-        command_timeout_s: Age up to which a command is valid, without the controller's period.
-        controller_period_s: Period of the navigators' commands.
-        jitter_m: Largest random displacement of a start pose.
-        lidar_caster: Ray caster, see ``casters``: "kernel", or "bullet" for the physics engine.
-        odom_drift: Speeds at which the odometry frames drift and turn in ``map``.
-
-    Raises:
-        InputError: A value is out of range; lists all of them.
-    """
-
-    lidar: LidarParams = field(default_factory=LidarParams)
-    flight: FlightParams = field(default_factory=FlightParams)
-    airframe: Airframe = field(default_factory=Airframe)
-    command_timeout_s: float = 0.5
-    controller_period_s: float = 0.05
-    jitter_m: float = 0.0
-    lidar_caster: str = "kernel"
-    odom_drift: OdomDrift = OdomDrift()
-
-    def __post_init__(self) -> None:
-        problems = [
-            f"{name}: {value}, expected {unit}, 0 or more"
-            for name, value, unit in [
-                ("command_timeout", self.command_timeout_s, "seconds"),
-                ("controller_period", self.controller_period_s, "seconds"),
-                ("jitter", self.jitter_m, "metres"),
-            ]
-            if not 0.0 <= value < math.inf
-        ]
-        if self.lidar_caster not in LIDAR_CASTERS:
-            problems.append(f"lidar: {self.lidar_caster!r}, expected {' or '.join(LIDAR_CASTERS)}")
-        if problems:
-            raise InputError(problems)
 
 
 class Simulation:

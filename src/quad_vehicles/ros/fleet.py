@@ -35,7 +35,7 @@ from quad_nav.topics.flight_info import EVENTS_TOPIC, from_text
 from quad_nav.topics.vehicle_states import IN_FLIGHT, ON_GROUND, State
 from quad_vehicles.ros.node import LAND_ALL_TOPIC
 from quad_vehicles.ros.scene_topics import SceneLidars, SceneTopics
-from quad_vehicles.ros.simulated import TICK_S, SimulatedVehicles, starts_of
+from quad_vehicles.starts import starts_of
 from quad_vehicles.vehicle_file import Vehicle, load_vehicles
 
 READY_WAIT_S = 90.0
@@ -316,11 +316,13 @@ def main() -> int:
     topics = SceneTopics(scene, len(vehicles), values["map_resolution"]) if scene else None
     fleet = VehicleFleet(vehicles, values["land_when_done"])
     lidars: Optional[SceneLidars] = None
-    bodies: Optional[SimulatedVehicles] = None
+    bodies: Any = None
     sees_scene = values["lidar_for"] == "vehicles"
     scanned = [one.number for one in vehicles if sees_scene or one.kind == "simulated"]
     if scene is not None and scanned:
         lidars = SceneLidars(scene, len(vehicles), scanned, lidar)
+        from quad_vehicles.ros.simulated import SimulatedVehicles  # it loads the physics engine
+
         try:
             bodies = SimulatedVehicles(scene, vehicles, sees_scene, time.monotonic())
         except InputError as error:
@@ -331,12 +333,10 @@ def main() -> int:
     return 0
 
 
-def _run(
-    lidars: Optional[SceneLidars], bodies: Optional[SimulatedVehicles], scan_period_s: float
-) -> None:
+def _run(lidars: Optional[SceneLidars], bodies: Any, scan_period_s: float) -> None:
     """Advance the bodies and publish the scans until ROS shuts down."""
     next_s = next_scan_s = time.monotonic()
-    tick_s = scan_period_s if bodies is None else TICK_S
+    tick_s = scan_period_s if bodies is None else bodies.tick_s
     while not rospy.is_shutdown():
         now_s = time.monotonic()
         if bodies is not None:

@@ -7,9 +7,8 @@ them. It runs in wall time, as real vehicles do.
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
-from typing import Dict, List, Optional, Sequence, Tuple
+from typing import Dict, Sequence
 
 import numpy as np
 import rospy
@@ -17,8 +16,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
-from quad_nav.errors import InputError
-from quad_nav.geometry import Pose2D, Pose3D
+from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.conversions import (
     key_values,
     odometry_message,
@@ -28,10 +26,12 @@ from quad_nav.ros.common.conversions import (
 from quad_nav.ros.simulator.commands import Commands
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
-from quad_nav.sim.scene import BODY_RADIUS_M, Scene
-from quad_nav.sim.simulation import STEPS_PER_S, Simulation
+from quad_nav.sim.scene import Scene
+from quad_nav.sim.simulation import Simulation
+from quad_nav.sim.simulation_params import STEPS_PER_S
 from quad_nav.topics.flight_info import CONTACT_STATUS, contact_values
 from quad_vehicles.ros.scene_topics import PoseListener
+from quad_vehicles.starts import starts_of
 from quad_vehicles.vehicle_file import Vehicle
 
 STEPS_PER_TICK = 4
@@ -45,7 +45,13 @@ _FLOOR = "floor"
 
 
 class SimulatedVehicles:
-    """Bodies of all vehicles in one simulation, and the topics of the simulated ones."""
+    """Bodies of all vehicles in one simulation, and the topics of the simulated ones.
+
+    Attributes:
+        tick_s: Period of ``advance``.
+    """
+
+    tick_s = TICK_S
 
     def __init__(
         self, scene: Scene, vehicles: Sequence[Vehicle], are_real_in_scene: bool, now_s: float
@@ -149,29 +155,3 @@ class SimulatedVehicles:
     def close(self) -> None:
         """Free the physics engine."""
         self._simulation.close()
-
-
-def starts_of(scene: Scene, vehicles: Sequence[Vehicle]) -> Tuple[Pose2D, ...]:
-    """Return where each vehicle stands at first: its file's pose, or the scene's.
-
-    Raises:
-        InputError: A simulated vehicle has neither, or touches another one; lists all of them.
-    """
-    starts: List[Optional[Pose2D]] = []
-    problems = []
-    for k, one in enumerate(vehicles):
-        start = one.map_from_start
-        if start is None and one.number < len(scene.starts):
-            start = scene.starts[one.number]
-        if start is None and one.kind == "simulated":
-            problems.append(f"{one.name}: no start, and scene {scene.name} has none for it")
-        for before, its in zip(vehicles[:k], starts):
-            is_near = start and its and start.distance_to(its) <= 2.0 * BODY_RADIUS_M
-            if is_near and "simulated" in (one.kind, before.kind):
-                what = f"{one.name}: starts less than {2.0 * BODY_RADIUS_M:g} m from {before.name}"
-                problems.append(f"{what}, expected a place of its own")
-        starts.append(start)
-    if problems:
-        raise InputError(problems)
-    far = Pose2D(-math.fabs(scene.end_x_m) - 100.0, 0.0)
-    return tuple(far if start is None else start for start in starts)

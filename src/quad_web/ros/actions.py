@@ -20,8 +20,8 @@ from quad_nav.mission.goal_file import PlaceCheck
 from quad_nav.mission.robot_goals import goal_paths
 from quad_nav.ros.common.nav_messages import planar_pose, pose_stamped
 from quad_nav.ros.sequencer.mission_stop import RESUME_SERVICE, STOP_SERVICE, STOPPED_PARAMETER
-from quad_nav.ros.simulator.topics import FASTEST_RATE
 from quad_nav.scenario.goal_checks import place_check
+from quad_nav.sim.simulation_params import FASTEST_RATE
 from quad_nav.topics.goal_routing import GoalRouter
 from quad_web.ros.calls import PATIENCE_S, CallFailed, call, in_threads, set_number
 from quad_web.ros.parameters import NavigatorParameters

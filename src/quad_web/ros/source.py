@@ -10,8 +10,8 @@ from typing import Any, Dict, FrozenSet, List, Mapping, Optional, Sequence, Set,
 import rospy
 
 from quad_nav.geometry import Pose2D
-from quad_nav.ros.simulator.topics import FASTEST_RATE
 from quad_nav.scenario.rules import START_S
+from quad_nav.sim.simulation_params import FASTEST_RATE
 from quad_web.ros.frames import Frames
 from quad_web.ros.health import LOST_AFTER_S, FleetHealth
 from quad_web.ros.intake import Subscriptions

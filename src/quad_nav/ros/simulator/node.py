@@ -43,7 +43,7 @@ from quad_nav.ros.composed.own_nodes import OwnNodes, ignore_publishers
 from quad_nav.ros.navigator.nodes import log_invalid, prepare
 from quad_nav.ros.navigator.reconfigure import ParameterServer, config_type
 from quad_nav.ros.simulator.commands import Commands
-from quad_nav.ros.simulator.topics import FASTEST_RATE, SimulatorTopics
+from quad_nav.ros.simulator.topics import SimulatorTopics
 from quad_nav.scenario.simulator_setup import (
     DEFAULTS,
     SimulatorSetup,
@@ -52,7 +52,7 @@ from quad_nav.scenario.simulator_setup import (
 )
 from quad_nav.sim.body import GoalSphere
 from quad_nav.sim.pacing import Pacer, RateMeter
-from quad_nav.sim.simulation import STEP_S, STEPS_PER_S
+from quad_nav.sim.simulation_params import FASTEST_RATE, STEP_S, STEPS_PER_S
 from quad_nav.topics.validation import MAX_MAGNITUDE
 
 _STEPS_PER_CLOCK = STEPS_PER_S // 120

@@ -25,6 +25,7 @@ from quad_nav.ros.simulator.pose_topics import PoseTopics
 from quad_nav.scenario.scene_map import scene_map
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.simulation import Simulation
+from quad_nav.sim.simulation_params import FASTEST_RATE
 from quad_nav.topics.flight_info import (
     CONTACT_STATUS,
     FLIGHT_TOPIC,
@@ -43,8 +44,6 @@ from quad_nav.topics.markers import (
     scene_markers,
 )
 
-FASTEST_RATE = 1000.0
-"""From this rate on the simulation goes as fast as it can, and does not lag."""
 _LAGS_BELOW = 0.9
 """The simulation lags if it reaches less than this part of the requested rate."""
 _LAGGING_REPORTS = 3

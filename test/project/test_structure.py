@@ -1,0 +1,176 @@
+"""Sizes of modules and functions, docstrings of everything public, one source of the version."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+from typing import Iterator, List, Tuple
+from xml.etree import ElementTree
+
+import pytest
+
+import quad_nav
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = ROOT / "src"
+PACKAGE = SOURCES / "quad_nav"
+MODULES = sorted(SOURCES.rglob("*.py"))
+
+MOST_LOOSE_MODULES = 8  # directly in quad_nav
+MOST_LINES = 400
+MOST_FUNCTION_LINES = 40  # signature and docstring included, kernels apart
+PRINTS_ITS_OWN = ("quad_nav/config/reference.py",)  # our own documentation
+
+
+def test_few_modules_are_outside_of_packages():
+    assert len([path for path in PACKAGE.glob("*.py")]) <= MOST_LOOSE_MODULES
+
+
+def test_modules_are_short_enough():
+    assert {name(path): lines_of(path) for path in MODULES if lines_of(path) > MOST_LINES} == {}
+
+
+def test_functions_are_short_enough():
+    assert [
+        f"{name(path)}:{function.lineno} {function.name}: {length(function)} lines"
+        for path in MODULES
+        if path.parent.name != "kernels"
+        for function in functions(ast.parse(path.read_text()))
+        if length(function) > MOST_FUNCTION_LINES
+    ] == []
+
+
+def test_everything_public_has_a_docstring():
+    assert [
+        f"{name(path)}:{line} {what}"
+        for path in MODULES
+        for line, what in undocumented(ast.parse(path.read_text()))
+    ] == []
+
+
+@pytest.mark.parametrize(
+    "source, missing",
+    [
+        ("def f(): ...", ["f"]),
+        ('def f():\n    """Do."""\n    def g(): ...', []),
+        ('class A:\n    """A."""\n    def m(self): ...\n    def _p(self): ...', ["A.m"]),
+        ("class _A:\n    def m(self): ...\ndef _f(): ...", []),
+        ("class A:\n    def __init__(self): ...", ["A"]),
+    ],
+)
+def test_undocumented_finds_what_is_public(source, missing):
+    assert [what for _, what in undocumented(ast.parse(f'"""Module."""\n{source}'))] == missing
+
+
+def test_nothing_is_imported_for_annotations_alone():
+    assert [name(path) for path in MODULES if "TYPE_CHECKING" in path.read_text()] == []
+
+
+def test_everything_printed_is_escaped():
+    """Terminals obey escape sequences, and keys, names and messages come from others."""
+    assert [
+        f"{name(path)}:{line}"
+        for path in MODULES
+        for line in unescaped_prints(path, ast.parse(path.read_text()))
+    ] == []
+
+
+def unescaped_prints(path: Path, tree: ast.Module) -> Iterator[int]:
+    """Yield lines that print to the terminal without ``errors.printable``."""
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        function = dotted(node.func)
+        if function == "print" and name(path) not in PRINTS_ITS_OWN:
+            if not is_escaped(node.args[0]):
+                yield node.lineno
+        elif function in ("click.echo", "click.secho", "sys.stdout.write", "sys.stderr.write"):
+            if len(node.args) == 1 and name(path) != "quad_nav/cli/options.py":  # 2: into a file
+                yield node.lineno
+
+
+def is_escaped(node: ast.AST) -> bool:
+    """Return true for ``printable(...)``, and for a text that begins with it."""
+    if isinstance(node, ast.BinOp):
+        return is_escaped(node.left)
+    if isinstance(node, ast.JoinedStr):
+        return is_escaped(node.values[0])
+    if isinstance(node, ast.FormattedValue):
+        return is_escaped(node.value)
+    return isinstance(node, ast.Call) and dotted(node.func) == "printable"
+
+
+def dotted(node: ast.AST) -> str:
+    """Return ``a.b`` for an attribute ``b`` of ``a``."""
+    if isinstance(node, ast.Attribute):
+        return f"{dotted(node.value)}.{node.attr}"
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+@pytest.mark.parametrize("source", ["print(x)", "click.echo(x)", "click.echo(x, err=True)"])
+def test_unescaped_prints_are_found(source):
+    assert list(unescaped_prints(PACKAGE / "x.py", ast.parse(source))) == [1]
+
+
+def test_version_is_the_one_of_the_ros_package():
+    assert quad_nav.__version__ == ElementTree.parse(ROOT / "package.xml").findtext("version")
+
+
+def test_changelog_has_the_version():
+    changelog = (ROOT / "CHANGELOG.md").read_text()
+    assert f"## [{quad_nav.__version__}]" in changelog
+
+
+def test_paths_on_the_architecture_page_exist():
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    table = page[page.index("| to change | open |") : page.index("## Rules of the core")]
+    paths = re.findall(r"`([\w./]+(?:/|\.py|\.md|Makefile|run))`", table)
+    assert len(paths) > 30
+    assert [
+        path for path in paths if not any((at / path).exists() for at in (PACKAGE, SOURCES, ROOT))
+    ] == []
+
+
+def test_every_package_is_on_the_architecture_page():
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    table = page[page.index("| package | holds |") : page.index("## To change X")]
+    packages = {path.parent.name + "/" for path in PACKAGE.glob("*/__init__.py")}
+    packages |= {path.parent.name + "/" for path in SOURCES.glob("*/__init__.py")} - {"quad_nav/"}
+    loose = {path.stem for path in PACKAGE.glob("*.py")} - {"__init__"}
+    assert set(re.findall(r"`([a-z_]+/?)`", table[: table.index("\n\n")])) >= packages | loose
+
+
+def name(path: Path) -> str:
+    return path.relative_to(SOURCES).as_posix()
+
+
+def lines_of(path: Path) -> int:
+    return len(path.read_text().splitlines())
+
+
+def length(function: ast.AST) -> int:
+    return function.end_lineno - function.lineno + 1
+
+
+def functions(tree: ast.AST) -> Iterator[ast.AST]:
+    kinds = (ast.FunctionDef, ast.AsyncFunctionDef)
+    return (node for node in ast.walk(tree) if isinstance(node, kinds))
+
+
+def undocumented(tree: ast.Module) -> List[Tuple[int, str]]:
+    """(line, name) of the module and its public classes, functions and methods without one."""
+    found = [] if ast.get_docstring(tree) else [(1, "the module")]
+    return found + list(_undocumented_members(tree, ""))
+
+
+def _undocumented_members(parent: ast.AST, prefix: str) -> Iterator[Tuple[int, str]]:
+    for node in ast.iter_child_nodes(parent):
+        if not isinstance(node, (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)):
+            continue
+        if node.name.startswith("_"):
+            continue
+        if not ast.get_docstring(node):
+            yield node.lineno, prefix + node.name
+        if isinstance(node, ast.ClassDef):
+            yield from _undocumented_members(node, f"{prefix}{node.name}.")

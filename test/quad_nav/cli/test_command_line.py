@@ -1,0 +1,130 @@
+"""Start of the command line: its help without the engine, suggestions, and a quiet flight."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from quad_nav.cli import COMMANDS, main
+from quad_nav.cli.fly import LIDAR_CASTERS, MAX_DRIFT
+from quad_nav.files.shipped import shipped
+from quad_nav.sim import odometry, simulation
+from quad_tune.courses import Mission, MissionCourse, MissionOptions
+
+SOURCES = Path(__file__).resolve().parents[3] / "src"
+ENGINE = ("numpy", "numba", "pybullet", "scipy", "matplotlib", "joblib", "optuna", "rich.progress")
+
+_MODULES = """
+import sys
+from quad_nav.cli import main
+try:
+    main({arguments!r}, prog_name="quad")
+except SystemExit as ended:
+    print(ended.code, *(name for name in {engine!r} if name in sys.modules), file=sys.stderr)
+"""
+
+
+def python(code, **options):
+    """Run code in a new interpreter with the sources."""
+    code = f"import sys; sys.path.insert(0, {str(SOURCES)!r})\n{code}"
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, **options
+    )
+
+
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["--version"], ["fli"], ["fly", "--help"]])
+def test_help_does_not_import_the_engine(arguments):
+    done = python(_MODULES.format(arguments=arguments, engine=ENGINE))
+    status = "2" if arguments == ["fli"] else "0"
+    assert done.stderr.splitlines()[-1] == status, done.stderr
+
+
+def test_every_command_is_listed_with_its_own_text():
+    text = CliRunner().invoke(main, []).output
+    for name, line in COMMANDS.items():
+        assert f"  {name:{max(map(len, COMMANDS))}}  {line}\n" in text
+        command = main.get_command(click.Context(main), name)
+        assert command is not None and command.name == name
+
+
+def test_constants_of_the_options_are_those_of_the_engine():
+    assert simulation.LIDAR_CASTERS == LIDAR_CASTERS
+    assert odometry.MAX_DRIFT == MAX_DRIFT
+
+
+@pytest.mark.parametrize(
+    "word, hint",
+    [
+        ("fli", "no command 'fli'; did you mean 'fly'?"),
+        ("reprot", "no command 'reprot'; did you mean 'report'?"),
+        ("zzz", "no command 'zzz'; see quad --help"),
+    ],
+)
+def test_unknown_command_names_the_nearest(word, hint):
+    done = CliRunner().invoke(main, [word])
+    assert (done.exit_code, done.output.splitlines()[-1]) == (2, f"Error: {hint}")
+
+
+def test_engine_prints_nothing_when_it_is_imported():
+    done = python("import quad_nav.sim.body")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_engine_is_imported_without_standard_error():
+    done = python("import os; os.close(2); import quad_nav.sim.body; print(1)")
+    assert (done.returncode, done.stdout) == (0, "1\n")
+
+
+@pytest.mark.parametrize(
+    "command", ["fly", "tune", "sweep --over TrajectoryPlannerROS/vx_samples=3"]
+)
+@pytest.mark.parametrize(
+    "parameter, fault",
+    [
+        ("TrajectoryPlannerROS/max_vel_xx=0.2", "did you mean max_vel_x?"),
+        ("global_costmap/inflation_radus=0.5", "did you mean inflation_radius?"),
+        ("nowhere/width=3", "/nowhere"),
+        ("DWAPlannerROS/max_vel_x=0.3", "unused: base_local_planner is"),
+    ],
+)
+def test_parameters_without_effect_are_refused(command, parameter, fault):
+    done = CliRunner().invoke(main, [*command.split(), "--set", parameter, "-q"])
+    assert done.exit_code == 2, done.output
+    assert fault in done.output and "flight not started" in done.output
+
+
+def test_candidates_may_set_parameters_of_planners_that_others_choose():
+    """A study may search the planner and the parameters of each."""
+    course = MissionCourse(MissionOptions((Mission(None, shipped("goals")),), robots=1))
+    (case,) = course.search_cases(1)
+    setup = course.setup(case, (("DWAPlannerROS/max_vel_x", 0.3),))
+    assert len(setup.robots) == 1
+
+
+def test_too_many_quadcopters_are_refused_before_a_mission_is_made():
+    done = CliRunner().invoke(main, ["fly", "--robots", "1000"])
+    assert done.exit_code == 2
+    assert "robots: is 1000; expected a whole number, 1 to 100" in done.output
+
+
+def test_an_arena_that_takes_minutes_to_fill_is_refused():
+    done = CliRunner().invoke(main, ["fly", "--robots", "3", "--size", "10000"])
+    assert done.exit_code == 2
+    assert "size: is 10000.0; expected a number of metres, 0 to 250" in done.output
+
+
+@pytest.mark.parametrize("quiet", [[], ["-q"]])
+def test_every_output_is_announced(tmp_path, quiet):
+    summary, recording = tmp_path / "flight.json", tmp_path / "flight.bag"
+    command = ["fly", "--time-limit", "0.1", "--json", str(summary), "--record", str(recording)]
+    done = CliRunner().invoke(main, [*command, *quiet])
+    assert summary.exists() and recording.exists()
+    lines = done.output.splitlines()
+    announced = [f"json: {summary}", f"record: {recording}"]
+    assert [line for line in lines if line in announced] == ([] if quiet else announced)
+    assert lines == [] or not quiet

@@ -1,0 +1,205 @@
+"""Untrusted input never becomes code, and recordings hold no personal data."""
+
+from __future__ import annotations
+
+import ast
+import getpass
+import platform
+import shutil
+import socket
+import sys
+from pathlib import Path
+
+import lz4.frame
+import pytest
+from click.testing import CliRunner
+
+from quad_nav.cli import main
+from quad_nav.recording.bag_info import checked_flight
+
+ROOT = Path(__file__).parents[3]
+SOURCES = sorted(
+    [
+        *(ROOT / "src").rglob("*.py"),
+        *(ROOT / "nodes").iterdir(),
+        ROOT / "scripts" / "fly",
+        ROOT / "scripts" / "quad",
+    ]
+)
+PLAIN_LOADERS = ("PlainLoader", "_Loader", "SafeLoader")
+# Its input is what roslaunch has just printed, or ships with the package.
+SAFE_LOAD_IN = ("ros/common/preflight.py", "topics/rviz_file.py")
+
+
+def dangers(source, name="x.py"):
+    """Calls that make code, or far too much memory, of data."""
+    tree = ast.parse(source)
+    imported = {
+        alias.name.split(".")[0]
+        for node in ast.walk(tree)
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+        for alias in (
+            node.names if isinstance(node, ast.Import) else [ast.alias(node.module or "")]
+        )
+    }
+    found = sorted(imported & {"pickle", "cPickle", "dill", "shelve", "marshal", "xml.etree"})
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            found += _of_call(_dotted(node.func), node, name)
+    return found
+
+
+def _of_call(function, node, name):
+    keywords = {keyword.arg: keyword.value for keyword in node.keywords}
+    if function in ("eval", "exec", "compile", "__import__", "os.system", "os.popen"):
+        return [function]
+    if function in ("yaml.load", "yaml.load_all"):
+        loader = keywords.get("Loader")
+        loader = loader or (node.args[1] if len(node.args) > 1 else None)
+        return (
+            []
+            if getattr(loader, "id", getattr(loader, "attr", "")) in PLAIN_LOADERS
+            else [function]
+        )
+    if function in ("yaml.unsafe_load", "yaml.full_load"):
+        return [function]
+    if function == "yaml.safe_load" and not name.endswith(SAFE_LOAD_IN):
+        return [function]
+    if function in ("np.load", "numpy.load"):
+        allowed = keywords.get("allow_pickle")
+        return [] if isinstance(allowed, ast.Constant) and allowed.value is False else [function]
+    if function.startswith("subprocess.") and "shell" in keywords:
+        return [function]
+    return []
+
+
+def _dotted(node):
+    if isinstance(node, ast.Attribute):
+        return f"{_dotted(node.value)}.{node.attr}"
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.name)
+def test_sources_make_no_code_of_data(path):
+    assert dangers(path.read_text(encoding="utf-8"), path.as_posix()) == []
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "eval(x)",
+        "exec(x)",
+        "import pickle",
+        "from pickle import load",
+        "yaml.load(x)",
+        "yaml.load(x, Loader=yaml.Loader)",
+        "yaml.load(x, yaml.FullLoader)",
+        "yaml.unsafe_load(x)",
+        "yaml.safe_load(x)",
+        "np.load(x)",
+        "np.load(x, allow_pickle=True)",
+        "subprocess.run(x, shell=True)",
+        "os.system(x)",
+    ],
+)
+def test_dangerous_calls_are_found(source):
+    assert dangers(source)
+
+
+def test_parameters_in_recordings_load_no_plugins(monkeypatch):
+    # They may name Python classes of the author; showing them must not import them.
+    named = []
+    monkeypatch.setattr("quad_nav.config.plugins.load_class", lambda name, _: named.append(name))
+    checked_flight(
+        {
+            "robots": [
+                {
+                    "parameters": {
+                        "base_global_planner": "antigravity.Planner",
+                        "base_local_planner": "this.Planner",
+                    }
+                }
+            ]
+        }
+    )
+    assert named == []
+    assert not {"antigravity", "this"} & set(sys.modules)
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    """Files of a flight by the command line; user and machine have names that can be searched."""
+    with pytest.MonkeyPatch.context() as patch:
+        home = tmp_path_factory.mktemp("hidden8-home")
+        for name in ("USER", "LOGNAME", "USERNAME"):
+            patch.setenv(name, "hidden8-user")
+        patch.setenv("HOME", str(home))
+        patch.setenv("HOSTNAME", "hidden8-host")
+        patch.setattr(socket, "gethostname", lambda: "hidden8-host")
+        patch.setattr(platform, "node", lambda: "hidden8-host")
+        yield _fly(home)
+
+
+def _fly(home):
+    shutil.copytree(ROOT / "config" / "default", home / "mine")
+    shutil.copy(ROOT / "scenes" / "arena.yaml", home / "place.yaml")
+    goals = home / "goals"
+    goals.mkdir()
+    (goals / "quad0_goals.json").write_text('{"goals": [[2.1, 1.9]]}')
+    written = {name: home / f"flight.{name}" for name in ("bag", "mcap", "html", "json", "gif")}
+    for record in ("bag", "mcap"):
+        result = CliRunner().invoke(
+            main,
+            [
+                "fly",
+                "--robots",
+                "1",
+                "--config",
+                str(home / "mine"),
+                "--scene",
+                str(home / "place.yaml"),
+                "--goals",
+                str(goals),
+                "--record",
+                str(written[record]),
+                "--report",
+                str(written["html"]),
+                "--json",
+                str(written["json"]),
+                "--animate",
+                str(written["gif"]),
+                "--quiet",
+            ],
+        )
+        assert result.exit_code == 0, result.output
+    return written
+
+
+@pytest.mark.parametrize("kind", ["bag", "mcap", "html", "gif"])
+def test_files_of_a_flight_hold_no_user_machine_or_folder_names(flown, kind):
+    content = unpacked(flown[kind], kind)
+    assert b"quad0" in content or kind == "gif"
+    for secret in (
+        "hidden8-",
+        str(flown[kind].parent),
+        str(ROOT),
+        str(Path.home()) + "/",
+        f"/{getpass.getuser()}/",
+    ):
+        assert secret.encode() not in content, secret
+
+
+def unpacked(path, kind):
+    """A recording's bytes with the content of its chunks."""
+    content = path.read_bytes()
+    if kind not in ("bag", "mcap"):
+        return content
+    magic, at, parts = b"\x04\x22\x4d\x18", 0, [content]
+    while True:
+        at = content.find(magic, at)
+        if at < 0:
+            break
+        parts.append(lz4.frame.LZ4FrameDecompressor().decompress(content[at:]))
+        at += 4
+    assert len(parts) > 1
+    return b"".join(parts)

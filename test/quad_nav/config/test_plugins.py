@@ -1,0 +1,369 @@
+"""Plugins: the examples of docs/plugins.md fly, and unfit classes are refused."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import sys
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from quad_nav import config
+from quad_nav.config.plugins import Plugin, plugin_name
+from quad_nav.errors import GoalOutsideMap, InputError, NoPath
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.grid import INSCRIBED, LETHAL
+from quad_nav.navigator.tick import RobotPoses, State, Trigger
+from quad_nav.scenario.assembly import apply_configuration, build_navigator
+
+PAGE = (Path(__file__).resolve().parents[3] / "docs" / "plugins.md").read_text()
+COSTMAP = {
+    "width": 10.0,
+    "height": 10.0,
+    "resolution": 0.1,
+    "robot_radius": 0.2,
+    "plugins": [{"name": "inflation_layer", "type": "costmap_2d::InflationLayer"}],
+}
+HERE, GOAL = Pose2D(1.0, 2.0, 0.0), Pose2D(3.0, 5.0, 1.0)
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """Writes modules of a package that exists for one test."""
+    folder = tmp_path / "my_package"
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+    def write(name: str, text: str) -> None:
+        (folder / name).write_text(textwrap.dedent(text))
+        importlib.invalidate_caches()
+
+    yield write
+    for name in [name for name in sys.modules if name.split(".")[0] == "my_package"]:
+        del sys.modules[name]
+
+
+@pytest.fixture
+def tree(package):
+    """The page's package is written; its YAML on costmaps without obstacles."""
+    for source in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
+        package(re.match(r"# my_package/(\w+\.py)\n", source).group(1), source)
+    tree = {"global_costmap": dict(COSTMAP), "local_costmap": dict(COSTMAP)}
+    for text in re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL):
+        for key, value in yaml.safe_load(text).items():
+            tree[key] = {**tree[key], **value} if key in tree else value
+    return tree
+
+
+def problems(tree):
+    with pytest.raises(InputError) as caught:
+        config.load(tree, "/nav")
+    return caught.value.problems
+
+
+def fly(navigator, pose: Pose2D, goal: Pose2D, end_s: float):
+    """Ticks of a robot that follows its commands until the goal ends."""
+    ticks = [navigator.tick(0.0, RobotPoses(pose, pose), Twist2D())]
+    navigator.set_goal(goal, 0.0)
+    command, now_s = Twist2D(), 0.0
+    while now_s < end_s and not ticks[-1].outcome:
+        ticks.append(navigator.tick(now_s, RobotPoses(pose, pose), command))
+        command = ticks[-1].command or command
+        step_s = max(min(navigator.next_due_s - now_s, 0.1), 1e-3)
+        pose = Pose2D(
+            pose.x_m + step_s * command.vx_mps * np.cos(pose.yaw_rad),
+            pose.y_m + step_s * command.vx_mps * np.sin(pose.yaw_rad),
+            pose.yaw_rad + step_s * command.vyaw_radps,
+        )
+        now_s += step_s
+    return ticks, pose
+
+
+def test_examples_load_with_remarks_on_empty_costmaps_only(tree):
+    configuration = config.load(tree, "/nav")
+
+    assert [remark.place for remark in configuration.remarks] == ["/nav/local_costmap"]
+    assert configuration.global_planner.parameters == {"max_cost": 50}
+    assert configuration.local_planner.parameters == {"speed": 0.4, "xy_goal_tolerance": 0.2}
+    assert configuration.local_planner_period_s == 0.1
+    layers = dict(configuration.global_costmap.layers)
+    assert list(layers) == ["pond", "inflation_layer"]
+    assert layers["pond"]["radius"] == 0.5
+    [(name, recovery)] = configuration.recoveries
+    assert name == "back_off" and isinstance(recovery, Plugin)
+    again = config.load(configuration.to_tree(), "/nav")
+    assert again.global_planner == configuration.global_planner
+    assert again.recoveries == configuration.recoveries
+
+
+def test_examples_fly_to_the_goal(tree):
+    navigator = build_navigator(config.load(tree))
+
+    ticks, pose = fly(navigator, HERE, GOAL, 30.0)
+
+    assert ticks[-1].outcome.succeeded
+    assert pose.distance_to(GOAL) <= 0.2
+    plans = [tick.plan for tick in ticks if tick.plan is not None]
+    np.testing.assert_allclose(plans[0][[0, -1]], [[1.0, 2.0, 1.0], [3.0, 5.0, 1.0]])
+
+
+def test_example_layer_is_in_the_costmap_and_inflated(tree):
+    navigator = build_navigator(config.load(tree))
+    navigator.tick(0.0, RobotPoses(HERE, HERE), Twist2D())
+
+    costs, spec = navigator.global_costmap.costs, navigator.global_costmap.spec
+    centre, beside = spec.cell_of(4.0, 2.0), spec.cell_of(4.65, 2.05)
+    assert costs[centre[1], centre[0]] == LETHAL
+    assert costs[beside[1], beside[0]] == INSCRIBED
+    assert (costs == LETHAL).sum() == pytest.approx(np.pi * 0.5**2 / 0.1**2, rel=0.1)
+
+
+def test_example_layer_can_be_switched_off(tree):
+    tree["global_costmap"]["pond"] = {**tree["global_costmap"]["pond"], "enabled": False}
+    navigator = build_navigator(config.load(tree))
+    navigator.tick(0.0, RobotPoses(HERE, HERE), Twist2D())
+    assert not navigator.global_costmap.costs.any()
+
+
+def test_example_planner_fails_and_example_recovery_backs_off(tree):
+    tree["planner_patience"] = 0.5
+    navigator = build_navigator(config.load(tree))
+
+    ticks, pose = fly(navigator, HERE, Pose2D(7.0, 2.0), 10.0)
+
+    assert any(
+        re.match(r"there is an obstacle at \(3\.\d\d, 2\.00\) m", tick.planning_failed)
+        for tick in ticks
+    )
+    assert [tick.recovery.name for tick in ticks if tick.recovery] == ["back_off"]
+    assert pose.x_m == pytest.approx(HERE.x_m - 0.3, abs=0.02)
+    assert ticks[-1].outcome.text == Trigger.PLANNING.value
+    with pytest.raises(GoalOutsideMap):
+        navigator.make_plan(HERE, Pose2D(1.0, -1.0))
+    with pytest.raises(NoPath):
+        navigator.make_plan(HERE, Pose2D(4.0, 2.0))
+
+
+def test_planner_is_kept_until_the_footprint_changes(tree):
+    configuration = config.load(tree)
+    navigator = build_navigator(configuration)
+    planner = navigator.planner
+
+    configuration = config.updated(configuration, "", {"planner_frequency": 1.0})
+    apply_configuration(navigator, configuration)
+    assert navigator.planner is planner
+    assert navigator.state is State.IDLE
+    apply_configuration(
+        navigator, config.updated(configuration, "global_costmap", {"robot_radius": 0.3})
+    )
+    assert navigator.planner is not planner
+
+
+def test_nothing_of_a_plugin_is_reconfigurable(tree):
+    namespaces = config.reconfigurable(config.load(tree))
+    assert list(namespaces) == [
+        "",
+        "global_costmap",
+        "global_costmap/inflation_layer",
+        "local_costmap",
+        "local_costmap/inflation_layer",
+        "fixes",
+    ]
+
+
+def test_error_on_a_missing_parameter_names_its_place(tree):
+    del tree["back_off"]
+    tree["global_costmap"]["pond"] = {"x": 1.0}
+    configuration = config.load(tree)
+    with pytest.raises(InputError, match="^global_costmap/pond/y: missing; expected a value$"):
+        build_navigator(configuration)
+    tree["global_costmap"] = COSTMAP
+    with pytest.raises(InputError, match="^back_off/distance: missing; expected a value$"):
+        build_navigator(config.load(tree))
+
+
+def test_enabled_of_a_layer_has_to_be_a_boolean(tree):
+    tree["global_costmap"]["pond"] = {"enabled": "no"}
+    assert problems(tree) == [
+        "/nav/global_costmap/pond/enabled: 'no' is not a boolean; expected true or false"
+    ]
+
+
+@pytest.mark.parametrize(
+    "name, expected",
+    [
+        ("navfn/NavfnROS", "NavfnROS"),
+        ("costmap_2d::ObstacleLayer", "ObstacleLayer"),
+        ("my_package.planners.StraightLine", "StraightLine"),
+        ("NavfnROS", "NavfnROS"),
+    ],
+)
+def test_namespace_of_a_plugin(name, expected):
+    assert plugin_name(name) == expected
+
+
+def test_missing_module_or_class(package):
+    package("planners.py", "limit = 3\n")
+    assert problems(
+        {
+            "base_global_planner": "no_such_package.planners.Mine",
+            "base_local_planner": "my_package.nowhere.Mine",
+        }
+    ) == [
+        "/nav/base_local_planner: no module my_package.nowhere; expected package.module.Class"
+        " with the package's folder in PYTHONPATH",
+        "/nav/base_global_planner: no module no_such_package; expected package.module.Class"
+        " with the package's folder in PYTHONPATH",
+    ]
+    [line] = problems({"base_global_planner": "my_package.planners.Mine"})
+    assert re.fullmatch(
+        r"/nav/base_global_planner: my_package\.planners \(.*planners\.py\) has no"
+        r" class Mine; expected a global planner as package\.module\.Class",
+        line,
+    )
+    [line] = problems({"base_global_planner": "my_package.planners.limit"})
+    assert "has limit, not a class" in line
+
+
+@pytest.mark.parametrize(
+    "source, complaint",
+    [
+        ("import no_such_thing", "ModuleNotFoundError: No module named 'no_such_thing'"),
+        ("x = 1\ny = undefined", r"NameError: name 'undefined' is not defined \(.*broken\.py:2\)"),
+        ("def f(:", "SyntaxError"),
+    ],
+)
+def test_module_that_cannot_be_imported(package, source, complaint):
+    package("broken.py", source)
+    [line] = problems({"base_global_planner": "my_package.broken.Mine"})
+    assert line.startswith("/nav/base_global_planner: cannot import my_package.broken: ")
+    assert re.search(complaint, line)
+
+
+def test_planner_that_lacks_something(package):
+    package(
+        "planners.py",
+        """
+        class Mine:
+            def __init__(self, params):
+                pass
+
+            def make_plan(self, spec, costs):
+                return None
+
+        class Follower:
+            def __init__(self, params, footprint, control_period_s):
+                pass
+
+            def set_plan(self, plan):
+                pass
+
+            def compute_velocity(self, spec, costs, pose, velocity):
+                pass
+    """,
+    )
+    mine = "/nav/base_global_planner: my_package.planners.Mine is not a global planner: "
+    assert problems({"base_global_planner": "my_package.planners.Mine"}) == [
+        mine + "__init__(self, params) cannot take its arguments; expected"
+        " __init__(self, params, footprint)",
+        mine + "make_plan(self, spec, costs) cannot take its arguments; expected"
+        " make_plan(self, spec, costs, start, goal)",
+    ]
+    follower = "/nav/base_local_planner: my_package.planners.Follower is not a local planner: "
+    assert problems({"base_local_planner": "my_package.planners.Follower"}) == [
+        follower + "it has no method set_footprint; expected set_footprint(self, footprint)",
+        follower + "compute_velocity(self, spec, costs, pose, velocity) cannot take its arguments;"
+        " expected compute_velocity(self, spec, costs, pose, velocity,"
+        " local_from_plan)",
+        follower + "it has no method is_goal_reached; expected is_goal_reached(self)",
+        follower + "it has no method cost_cloud; expected cost_cloud(self)",
+    ]
+
+
+def test_method_inherited_from_the_interface_does_not_count(package):
+    package(
+        "planners.py",
+        """
+        from quad_nav.plan.planner import GlobalPlanner
+
+        class Mine(GlobalPlanner):
+            def __init__(self, params, footprint):
+                pass
+    """,
+    )
+    [line] = problems({"base_global_planner": "my_package.planners.Mine"})
+    assert line.endswith(
+        "it has no method make_plan; expected make_plan(self, spec, costs, start, goal)"
+    )
+
+
+def test_any_signature_that_can_take_the_arguments_will_do(package):
+    package(
+        "planners.py",
+        """
+        class Mine:
+            def __init__(self, *arguments, **options):
+                pass
+
+            @staticmethod
+            def make_plan(spec, costs, start, goal, hurry=False):
+                return None
+    """,
+    )
+    assert config.load({"base_global_planner": "my_package.planners.Mine"})
+
+
+def test_layer_that_lacks_something(package):
+    package(
+        "layers.py",
+        """
+        from quad_nav.costmap.layer import Layer
+
+        class Plain:
+            pass
+
+        class Mine(Layer):
+            def update_bounds(self, robot, bounds):
+                return bounds
+    """,
+    )
+    costmap = {
+        "plugins": [
+            {"name": "plain", "type": "my_package.layers.Plain"},
+            {"name": "mine", "type": "my_package.layers.Mine"},
+        ]
+    }
+    mine = "/nav/local_costmap/plugins/mine: my_package.layers.Mine is not a costmap layer: "
+    assert problems({"local_costmap": costmap}) == [
+        "/nav/local_costmap/plugins/plain: my_package.layers.Plain is not a costmap layer: it is"
+        " not derived from Layer; expected class Plain(quad_nav.costmap.layer.Layer)",
+        mine + "__init__(self, params) cannot take its arguments; expected __init__(self, params,"
+        " spec, rolling_window, default_cost)",
+        mine + "update_bounds(self, robot, bounds) cannot take its arguments; expected"
+        " update_bounds(self, robot, now_s, bounds)",
+    ]
+
+
+def test_recovery_that_lacks_something(package):
+    package(
+        "recoveries.py",
+        """
+        class Mine:
+            def __init__(self, params):
+                self.period_s = 0.1
+
+            def step(self, context):
+                pass
+    """,
+    )
+    behaviours = [{"name": "mine", "type": "my_package.recoveries.Mine"}]
+    mine = "/nav/recovery_behaviors/mine: my_package.recoveries.Mine is not a recovery behaviour: "
+    assert problems({"recovery_behaviors": behaviours}) == [
+        mine + "it has no period_s; expected a class attribute or a property of that name",
+        mine + "it has no method start; expected start(self, context)",
+    ]

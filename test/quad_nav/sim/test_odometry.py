@@ -1,0 +1,286 @@
+"""Odometry frames that drift and turn in the map: poses by hand, and flights that do not notice."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from recorded_flight import flown, setup
+
+from quad_nav.cli import main
+from quad_nav.errors import InputError
+from quad_nav.files.shipped import shipped
+from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
+from quad_nav.loop.navigator_group import LoopRobot
+from quad_nav.offline.flight import FlightObserver
+from quad_nav.offline.run import fly
+from quad_nav.peers.peer import Intention, Peer
+from quad_nav.recording import messages
+from quad_nav.recording.bag_file import read_messages
+from quad_nav.recording.bag_trace import read_trace
+from quad_nav.recording.recorder import Recorder
+from quad_nav.scenario.flight_setup import FlightOptions, read_setup
+from quad_nav.scenario.scenario import read_configurations
+from quad_nav.sim.odometry import OdomDrift, OdomFrames, pose_in
+from quad_nav.sim.scene_file import load_scene
+from quad_nav.sim.simulation import Simulation
+from quad_nav.sim.simulation_params import SimulationParams
+
+DRIFT = OdomDrift(0.04, 0.02)
+QUARTER_TURN = math.pi / 2
+PILLAR, PILLAR_RADIUS_M = (5.9, 5.9), 0.35  # pillar_centre of scenes/arena.yaml
+
+
+def configuration(folder: Path, global_frame: str, local_frame: str) -> str:
+    """Copy the default configuration with other global frames of the costmaps."""
+    folder.mkdir()
+    for path in sorted(shipped("config", "default").glob("*.yaml")):
+        frame = global_frame if path.name.startswith("global") else local_frame
+        text = path.read_text(encoding="utf-8")
+        text = text.replace("global_frame: map", f"global_frame: {frame}")
+        (folder / path.name).write_text(text, encoding="utf-8")
+    return str(folder)
+
+
+class Walls(FlightObserver):
+    """Offsets of the pillar's centroid in the local costmaps from its place in the map."""
+
+    needs_single_process = True
+
+    def __init__(self):
+        self.offsets_m = []
+
+    def on_start(self, flight):
+        self._flight = flight
+
+    def on_tick(self, robot, tick, located, wall_s):
+        if "local" not in tick.windows:
+            return
+        costmap = self._flight.offline_robots[robot].navigator.local_costmap
+        map_from_odom = (
+            self._flight.states[robot].map_from_base.to_2d().compose(located.in_local.inverse())
+        )
+        spec, around_m = costmap.spec, PILLAR_RADIUS_M + 0.1
+        x_m, y_m = map_from_odom.inverse_transform(*PILLAR)
+        x_m, y_m = x_m - spec.origin_x_m, y_m - spec.origin_y_m
+        if not all(around_m <= one <= 3.0 - around_m for one in (x_m, y_m)):
+            return
+        rows, columns = np.nonzero(costmap.costs == 254)
+        in_odom = [spec.centre_of(x, y) for x, y in zip(columns, rows)]
+        in_map = map_from_odom.transform_points(np.array(in_odom).reshape(-1, 2))
+        near = in_map[np.hypot(*(in_map - PILLAR).T) < around_m]
+        assert len(near) > 0
+        self.offsets_m.append(float(np.hypot(*(near.mean(axis=0) - PILLAR))))
+
+
+# -- frames ------------------------------------------------------------------------------
+
+
+def test_a_frame_moves_and_turns_at_the_given_speeds():
+    frames = OdomFrames(OdomDrift(0.2, 0.1), 3, seed=4)
+    early, late = frames.map_from_odom(1, 5.0), frames.map_from_odom(1, 10.0)
+    assert (late.x_m, late.y_m) == pytest.approx((2.0 * early.x_m, 2.0 * early.y_m))
+    assert math.hypot(late.x_m, late.y_m) == pytest.approx(2.0)
+    assert (abs(early.yaw_rad), abs(late.yaw_rad)) == (0.5, 1.0)
+    assert frames.map_from_odom(1, 0.0) == Pose2D(0.0, 0.0)
+
+
+def test_frames_differ_by_robot_and_seed():
+    frames = OdomFrames(DRIFT, 2, seed=4)
+    first, second = (frames.map_from_odom(robot, 10.0) for robot in (0, 1))
+    assert first.yaw_rad == -second.yaw_rad != 0.0
+    assert first.distance_to(second) > 0.01
+    assert OdomFrames(DRIFT, 2, seed=4).map_from_odom(0, 10.0) == first
+    assert OdomFrames(DRIFT, 2, seed=5).map_from_odom(0, 10.0).distance_to(first) > 0.01
+
+
+def test_only_a_robot_s_own_odometry_frame_moves():
+    frames = OdomFrames(DRIFT, 2, seed=0)
+    moved = frames.map_from_odom(1, 10.0)
+    assert frames.map_from_frame("odom1", 1, 10.0) == moved
+    assert frames.map_from_frame("/odom1", 1, 10.0) == moved
+    assert frames.map_from_frame("map", 1, 10.0) == Pose2D(0.0, 0.0)
+    assert OdomFrames(OdomDrift(), 2, seed=0).map_from_odom(1, 10.0) == Pose2D(0.0, 0.0)
+
+
+def test_a_pose_in_a_frame_that_was_moved_and_turned():
+    """The robot is 3 m along x of a frame at (1, 2) that is turned by a quarter to the left."""
+    robot = Pose3D(1.0, 5.0, 0.7, quaternion_from_yaw(QUARTER_TURN))
+    found = pose_in(Pose2D(1.0, 2.0, QUARTER_TURN), robot)
+    assert (found.x_m, found.y_m, found.z_m) == pytest.approx((3.0, 0.0, 0.7))
+    assert found.yaw_rad == pytest.approx(0.0)
+    assert pose_in(Pose2D(0.0, 0.0), robot) is robot
+
+
+def test_a_peer_and_its_path_in_such_a_frame():
+    intention = Intention(-7.0, np.array([[1.0, 5.0], [1.0, 6.0]]))
+    peer = Peer("quad1", 1.0, 5.0, 0.0, 0.3, 12.0, intention)
+    found = peer.relative_to(Pose2D(1.0, 2.0, QUARTER_TURN))
+    assert (found.x_m, found.y_m) == pytest.approx((3.0, 0.0))
+    assert (found.vx_mps, found.vy_mps) == pytest.approx((0.3, 0.0))
+    assert (found.name, found.stamp_s, found.intention.priority) == ("quad1", 12.0, -7.0)
+    assert found.intention.path == pytest.approx(np.array([[3.0, 0.0], [4.0, 0.0]]))
+
+
+def test_the_simulation_starts_and_restarts_without_drift():
+    simulation = Simulation(
+        load_scene(shipped("scenes", "arena.yaml")),
+        2,
+        SimulationParams(odom_drift=OdomDrift(0.2, 0.1)),
+        start_step=240,
+    )
+    assert simulation.map_from_frame("odom0", 0) == Pose2D(0.0, 0.0)
+    simulation.advance(480)
+    drifted = simulation.map_from_frame("odom0", 0)
+    assert math.hypot(drifted.x_m, drifted.y_m) == pytest.approx(0.4)  # after 2 s
+    assert abs(drifted.yaw_rad) == pytest.approx(0.2)
+    simulation.reset()
+    assert simulation.map_from_frame("odom0", 0) == Pose2D(0.0, 0.0)
+    simulation.close()
+
+
+def test_a_goal_in_the_map_becomes_one_in_the_costmap_s_frame(tmp_path):
+    """Only then is the goal known in the frame that the robot plans in, ten seconds after start."""
+    config = configuration(tmp_path / "config", "odom$(arg i)", "map")
+    frames = OdomFrames(OdomDrift(0.2, 0.1), 1, seed=0)
+    robot = LoopRobot(read_configurations(config, 1)[0], 0, frames)
+    robot.waiting_goal = Pose2D(3.0, 4.0, 0.5)
+    robot.is_due(10.0)
+    goal, map_from_odom = robot.navigator.goal, frames.map_from_odom(0, 10.0)
+    assert map_from_odom.transform(goal.x_m, goal.y_m) == pytest.approx((3.0, 4.0))
+    assert goal.yaw_rad == pytest.approx(0.5 - map_from_odom.yaw_rad)
+    assert goal.distance_to(Pose2D(3.0, 4.0)) > 1.0
+
+
+@pytest.mark.parametrize("speeds", [(-0.1, 0.0), (0.0, 1.1), (math.nan, 0.0), (0.0, math.inf)])
+def test_speeds_out_of_range_are_refused(speeds):
+    with pytest.raises(InputError, match="odom_drift: .*expected m/s and rad/s, 0 to 1 each"):
+        OdomDrift(*speeds)
+
+
+@pytest.mark.parametrize("arguments", [["0.1"], ["0.1", "2"], ["-1", "0"], ["nan", "0"]])
+def test_the_command_refuses_other_speeds(arguments):
+    result = CliRunner().invoke(main, ["fly", "--time-limit", "0.1", "--odom-drift", *arguments])
+    assert result.exit_code == 2
+
+
+# -- flights -----------------------------------------------------------------------------
+
+
+def test_without_drift_the_frame_of_a_costmap_changes_no_bit(tmp_path):
+    flights = [
+        flown(setup(tmp_path, config=configuration(tmp_path / name, *frames)))
+        for name, frames in (("map", ("map", "map")), ("odom", ("odom$(arg i)",) * 2))
+    ]
+    assert flights[0].summary.robots == flights[1].summary.robots
+    for one, other in zip(*(flight.trace.robots for flight in flights)):
+        for field in ("times_s", "positions_m", "quaternions", "velocities", "commands"):
+            assert np.array_equal(getattr(one, field), getattr(other, field)), field
+
+
+@pytest.mark.slow
+def test_static_walls_stay_in_place_in_a_rolling_costmap_that_drifts(tmp_path):
+    """LIDARs mark nothing here: only the static map keeps the robots from the walls."""
+    walls = Walls()
+    costmaps = ("global_costmap", "local_costmap")
+    blind = [(f"{name}/base_scan/obstacle_range", 0.01) for name in costmaps]
+    mapped = [(f"{name}/static_map", True) for name in costmaps]
+    options = FlightOptions(
+        shipped("scenes", "arena.yaml"),
+        shipped("goals"),
+        configuration(tmp_path / "config", "map", "odom$(arg i)"),
+        (*blind, *mapped),
+        time_limit_s=200.0,
+        simulation=SimulationParams(odom_drift=DRIFT),
+    )
+    summary = fly(read_setup(options), [walls])
+    assert summary.success, summary
+    assert len(walls.offsets_m) > 10
+    assert max(walls.offsets_m) < 0.02
+
+
+def test_goals_are_reached_with_both_costmaps_in_a_frame_that_drifts(tmp_path):
+    config = configuration(tmp_path / "config", *2 * ("odom$(arg i)",))
+    drift = SimulationParams(odom_drift=OdomDrift(0.02, 0.005))
+    summary = flown(setup(tmp_path, config=config, simulation=drift, time_limit_s=60.0)).summary
+    assert summary.success, summary
+
+
+def test_a_flight_that_drifts_is_the_same_in_two_processes(tmp_path):
+    """Intentions cross from process to process in the map."""
+    config = configuration(tmp_path / "config", *2 * ("odom$(arg i)",))
+    flight = setup(
+        tmp_path, config=config, simulation=SimulationParams(odom_drift=DRIFT), time_limit_s=10.0
+    )
+    assert fly(flight, processes=2).robots == fly(flight).robots
+
+
+def test_goals_off_a_costmap_that_drifts_are_not_refused(tmp_path):
+    """The costmap moves in the map, so its bounds in the map are not fixed."""
+    config = configuration(tmp_path / "config", "odom$(arg i)", "map")
+    small = (("global_costmap/width", 2), ("global_costmap/height", 2))
+    with pytest.raises(InputError, match="is off the global costmap"):
+        setup(tmp_path, config=config, parameters=small)
+    setup(
+        tmp_path,
+        config=config,
+        parameters=small,
+        simulation=SimulationParams(odom_drift=DRIFT),
+    )
+
+
+# -- recordings --------------------------------------------------------------------------
+
+
+class States(FlightObserver):
+    """True poses of robot 1 in the map."""
+
+    def __init__(self):
+        self.poses = []
+
+    def on_start(self, flight):
+        self.on_move(flight)
+
+    def on_move(self, flight):
+        self.poses.append(flight.states[1].map_from_base)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("drift")
+    config = configuration(folder / "config", *2 * ("odom$(arg i)",))
+    drift = SimulationParams(odom_drift=OdomDrift(0.02, 0.005))
+    states, recorder = States(), Recorder(folder / "flight.bag")
+    flight = flown(setup(folder, config=config, simulation=drift), [states, recorder])
+    return folder / "flight.bag", states, flight
+
+
+def test_recorded_odometry_and_transforms_make_the_true_pose(recorded):
+    path, states, _ = recorded
+    transforms = [m.content.transforms[3] for m in read_messages(path, lambda t, _: t == "/tf")]
+    odometry = [m.content for m in read_messages(path, lambda t, _: t == "/odom1")]
+    assert len(transforms) == len(odometry) == len(states.poses)
+    for transform, message, true in zip(transforms, odometry, states.poses):
+        assert (transform.header.frame_id, transform.child_frame_id) == ("map", "odom1")
+        moved = transform.transform
+        map_from_odom = messages.pose_from(moved.translation, moved.rotation)
+        pose = message.pose.pose
+        found = map_from_odom.compose(messages.pose_from(pose.position, pose.orientation))
+        assert found.translation == pytest.approx(true.translation, abs=1e-9)
+        assert found.yaw_rad == pytest.approx(true.yaw_rad, abs=1e-9)
+    assert math.hypot(map_from_odom.x_m, map_from_odom.y_m) > 0.05
+
+
+def test_a_trace_has_plans_in_the_map(recorded):
+    """A plan ends at its goal; the trace of the recording is that of the flight."""
+    path, _, flight = recorded
+    for seen, read in zip(flight.trace.robots, read_trace(path).robots):
+        assert np.allclose(read.positions_m, seen.positions_m, atol=1e-9)
+        assert len(read.plans) == len(seen.plans) > 1
+        for (_, one), (_, other) in zip(read.plans, seen.plans):
+            assert np.allclose(one[:, :2], other[:, :2], atol=1e-9)
+        goal = seen.goals[-1].pose
+        assert np.hypot(*(seen.plans[-1][1][-1, :2] - (goal.x_m, goal.y_m))) < 0.2
