@@ -171,11 +171,6 @@ class StateMachine:
                 self._stop_without_data(tick, missing)
             return
         follows = tick.control is not None and self.state is State.CONTROLLING
-        if follows and self.guard.watches(tick.now_s, self.control.tracks):
-            tick.command = Twist2D()
-            self.control.restart_timers(tick.now_s)
-            self._peers.restart_patience()
-            return
         plan = self.control.plan if follows else None
         neighbours = self._neighbours(poses, velocity)
         self.guard.check(tick, poses, velocity, self.control.tracks, plan, limits, neighbours)

@@ -350,10 +350,6 @@ class PeerCoordinator:
             control_period_s + LATENCY_S,
         )
 
-    def restart_patience(self) -> None:
-        """Count progress anew, for a robot that hovers for a while."""
-        self._stand_off.start_goal()
-
     def neighbours(
         self, pose: Pose2D, velocity: Twist2D, local_from_map: Pose2D, control_period_s: float
     ) -> Neighbours:
