@@ -25,18 +25,6 @@ def parameters(name):
             "people",
             {"fixes/moving_obstacle_max_acceleration", "fixes/moving_obstacle_evasion_speed"},
         ),
-        (
-            "dynabarn",
-            {
-                "robot_radius",
-                *(f"global_costmap/{name}" for name in ("width", "height", "origin_x", "origin_y")),
-                "TrajectoryPlannerROS/max_vel_x",
-                "fixes/moving_obstacle_evasion_speed",
-                "fixes/moving_obstacle_timeout",
-                "fixes/moving_obstacle_watch",
-                "fixes/yield_to_strangers",
-            },
-        ),
     ],
 )
 def test_a_configuration_differs_from_config_moving_in_these_alone(name, differences):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,22 +20,20 @@ from quad_nav.kernels.standing_obstacles import (
     overlap_cost,
     overlap_costs,
 )
-from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
 ON = EvasionParams(True, clearance_m=0.1)
 ORIGIN = Pose2D(0.0, 0.0)
 STILL = (0.0, 0.0)
 HOVER = np.zeros((1, 2))
-TIMES_S = prediction_times(MotionMemory(), 0.5)
+TIMES_S = prediction_times(0.5)
 SEARCH = SpaceTime(0.125, 0.5, 0.5, 0.5, 1.3, 50.0, 0.0, 100.0, 0.05)
 
 
 def around(pose=ORIGIN, costs=None, is_following=False, max_speed_mps=0.5):
     spec = GridSpec(160, 160, 0.05, -4.0, -4.0)
     costs = np.zeros(spec.shape, np.uint8) if costs is None else costs
-    memory, speeds_mps = MotionMemory(), (max_speed_mps, 0.5)
-    return Surroundings(spec, costs, pose, Twist2D(), 0.25, *speeds_mps, is_following, memory, 0.1)
+    return Surroundings(spec, costs, pose, Twist2D(), 0.25, max_speed_mps, 0.5, is_following, 0.1)
 
 
 def tracks(*states):
@@ -52,12 +49,6 @@ def test_discs_move_on_with_their_velocity_and_uncertainty():
     np.testing.assert_allclose(discs[0, 0, :3], [2.5, 1.0, 0.85])
     np.testing.assert_allclose(discs[20, 0, :3], [0.5, 1.0, 0.85])
     np.testing.assert_allclose(discs[[0, 20], 0, 3], [0.08, 0.08 + 2.0 * 0.05])
-
-
-def test_motions_that_repeat_are_predicted_for_longer():
-    assert TIMES_S[-1] == 6.0
-    times_s = prediction_times(SimpleNamespace(most_repeat=True), 0.5)
-    assert (times_s[-1], len(times_s)) == (10.0, 101)
 
 
 def test_obstacles_out_of_reach_have_no_discs():

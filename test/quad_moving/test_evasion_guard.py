@@ -135,20 +135,3 @@ def test_a_robot_evades_faster_than_it_flies_where_that_is_allowed(guard):
     guard.params = EvasionParams(avoid_moving_obstacles=True, speed_mps=0.2)
     still = checked(guard, track).command
     assert np.hypot(still.vx_mps, still.vy_mps) == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize(
-    "many_from_s, until_s", [(1.0, 6.0), (2.9, 6.0), (3.1, 3.0)], ids=["many", "late", "too late"]
-)
-def test_a_robot_watches_once(guard, many_from_s, until_s):
-    """Three obstacles are worth 6 s; with fewer it leaves after 3 s, and does not stop again."""
-    guard.params = replace(guard.params, watch_s=6.0)
-    watched = []
-    for k in range(100):
-        count = 3 if 0.1 * k >= many_from_s else 2
-        states = np.array([[5.0, y, 1.0, 0.0] for y in range(count)])
-        covariances = np.tile(1e-4 * np.eye(4), (count, 1, 1))
-        tracks = Tracks(0.1 * k, np.arange(count), states, covariances, np.full(count, 0.3))
-        watched.append(guard.watches(0.1 * k, tracks))
-    left = round(until_s / 0.1)
-    assert watched == [True] * left + [False] * (100 - left)

@@ -15,7 +15,6 @@ from quad_nav.grid import GridSpec
 from quad_nav.kernels.body_response import Body
 from quad_nav.kernels.passive_safety import Reachable, rest_in_time
 from quad_nav.kernels.standing_obstacles import MARGIN_M, StandingObstacles
-from quad_nav.tracking.motion_memory import MotionMemory, Recalled
 from quad_nav.tracking.tracks import Tracks
 
 PERIOD_S = 0.02
@@ -93,12 +92,11 @@ def test_a_command_comes_into_no_standing_obstacle_before_the_robot_rests():
         assert rests(3.0, AHEAD, standing=wall) is is_safe
 
 
-def surroundings(velocity=None, period_s=0.1, memory=None):
+def surroundings(velocity=None, period_s=0.1):
     spec = GridSpec(160, 160, 0.05, -4.0, -4.0)
     velocity, costs = velocity or Twist2D(), np.zeros(spec.shape, np.uint8)
-    here, memory = Pose2D(0.0, 0.0), memory or MotionMemory()
-    speeds_mps = 2.0, 0.5
-    return Surroundings(spec, costs, here, velocity, 0.35, *speeds_mps, True, memory, period_s)
+    here = Pose2D(0.0, 0.0)
+    return Surroundings(spec, costs, here, velocity, 0.35, 2.0, 0.5, True, period_s)
 
 
 def command_of(params, tracks, wish=None, **around):
@@ -177,21 +175,6 @@ def test_a_slower_control_cycle_needs_more_room():
 def test_a_person_far_away_leaves_the_wish_as_it_is():
     wish = Twist2D(vx_mps=0.5)
     assert command_of(PEOPLE, person(4.0, 3.0, 0.0, 1.0), wish) is wish
-
-
-class RecallsATurn(MotionMemory):
-    """It recalls that an obstacle like this turned, and went away along x at 1 m/s."""
-
-    def recall(self, number, times_s):
-        return Recalled(np.column_stack([times_s, 0.0 * times_s]), len(times_s))
-
-
-def test_a_person_who_turned_here_before_may_come_on():
-    """The robot is at rest, the person 0.5 m from its hull comes nearer at 1 m/s."""
-    coming, memory = person(1.1, 0.0, -1.0, 0.0), RecallsATurn()
-    trusting = replace(PEOPLE, max_acceleration_mps2=0.0)
-    assert command_of(trusting, coming, memory=memory).vx_mps > 0.0
-    assert command_of(PEOPLE, coming, memory=memory).vx_mps <= 0.0
 
 
 def test_who_has_stopped_may_walk_on():

@@ -13,7 +13,7 @@ from local_planner_cases import ORIGIN, SQUARE, WINDOW, free, line
 from quad_nav.control.dwa_critics import Critics
 from quad_nav.control.dwa_oscillation import OscillationCritic
 from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
-from quad_nav.control.prediction import FAR_M, NO_DISCS, join_discs, predict, rollout_discs
+from quad_nav.control.prediction import NO_DISCS, join_discs, predict, rollout_discs
 from quad_nav.control.rollout import Rollout
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
 from quad_nav.geometry import Twist2D
@@ -21,8 +21,6 @@ from quad_nav.kernels.collision import COLLIDES
 from quad_nav.kernels.moving_discs import MovingDiscs, passing_cost
 from quad_nav.navigator.control_supervisor import ControlSupervisor
 from quad_nav.navigator.tick import RobotPoses, Tick
-from quad_nav.tracking.motion_memory import MotionMemory
-from quad_nav.tracking.periodic_motion import Replays
 from quad_nav.tracking.tracks import Tracks
 
 SECOND = TrajectoryPlannerParams(sim_time_s=1.0, occdist_scale=0.01, holonomic_robot=False)
@@ -40,7 +38,7 @@ def tracks(*states, radius_m=0.3):
 def discs(*states, radius_m=0.3, rollout_s=1.0, pose=ORIGIN):
     """Predictions for a robot of 0 m radius that keeps 0.05 m clear."""
     seen = tracks(*states, radius_m=radius_m)
-    return rollout_discs(seen, MotionMemory(), pose, 0.0, 0.05, rollout_s)
+    return rollout_discs(seen, pose, 0.0, 0.05, rollout_s)
 
 
 def rollout(moving):
@@ -49,14 +47,14 @@ def rollout(moving):
 
 
 def test_predictions_move_on_and_grow_uncertain():
-    found = predict(tracks([1.0, 0.0, 0.5, -1.0]), MotionMemory(), np.array([0.0, 2.0]), (0.5, 0.0))
+    found = predict(tracks([1.0, 0.0, 0.5, -1.0]), np.array([0.0, 2.0]), (0.5, 0.0))
     np.testing.assert_allclose(found[0, 0], [0.5, 0.0, 0.3, 0.08])
     np.testing.assert_allclose(found[1, 0], [1.5, -2.0, 0.3, 0.08 + 2.0 * 0.05])
 
 
 def test_discs_of_a_rollout_span_its_time_and_hold_the_robots_radius():
     seen = tracks([1.0, 0.0, 0.0, 1.0])
-    moving = rollout_discs(seen, MotionMemory(), ORIGIN, 0.25, 0.1, 1.63)
+    moving = rollout_discs(seen, ORIGIN, 0.25, 0.1, 1.63)
     assert moving.discs.shape == (34, 1, 4)  # 33 steps of at most 0.05 s
     np.testing.assert_allclose(moving.discs[[0, -1], 0, :3], [[1.0, 0.0, 0.55], [1.0, 1.63, 0.55]])
 
@@ -177,28 +175,6 @@ def test_without_a_plan_there_is_no_command_either_way():
     control = supervised()
     control.set_plan(line(50.0, 0.0, 51.0, 0.0))
     assert command_of(control, discs([1.0, 0.0, -1.0, 0.0])) == (False, None)
-
-
-def test_periodic_motions_follow_the_tracks():
-    """One at (3, 1) without a track, known for the first of two times, seen from (1, 0)."""
-    places = np.array([[[3.0, 1.0]], [[np.nan, np.nan]]])
-    memory = MotionMemory()
-    memory.replay = lambda times_s: Replays(places, np.zeros((2, 1, 2)), np.array([0.4]))
-    found = predict(tracks([1.0, 0.0, 0.5, -1.0]), memory, np.array([0.0, 2.0]), (1.0, 0.0))
-    assert found.shape == (2, 2, 4)
-    np.testing.assert_allclose(found[0, 1], [2.0, 1.0, 0.4, 0.08])
-    np.testing.assert_allclose(found[1, 1], [FAR_M, FAR_M, 0.4, 0.08])
-    np.testing.assert_allclose(found[:, 0, :2], [[0.0, 0.0], [1.0, -2.0]])
-
-
-def test_a_track_with_a_periodic_motion_counts_once():
-    """The replay turns at (1.5, 0): the obstacle is where it was, not straight on."""
-    places = np.array([[[1.0, 0.0]], [[1.5, 1.0]]])
-    memory = MotionMemory()
-    memory.replay = lambda times_s: Replays(places, np.full((2, 1, 2), 0.5), np.array([0.4]))
-    found = predict(tracks([1.0, 0.0, 0.5, 0.0]), memory, np.array([0.0, 2.0]), (0.0, 0.0))
-    np.testing.assert_allclose(found[:, 0, 0], FAR_M)
-    np.testing.assert_allclose(found[:, 1, :2], [[1.0, 0.0], [1.5, 1.0]])
 
 
 def test_joined_discs_are_in_c_order():

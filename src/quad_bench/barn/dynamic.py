@@ -196,7 +196,7 @@ def flight_setup(
     A phase at which an obstacle is at the start is replaced by a later one.
     """
     seed, radius_m = contestant.seed + run, contestant.simulation.airframe.radius_m
-    goals = _goals(contestant.configuration.navigator.evasion.watch_s + TIME_LIMIT_S)
+    goals = _goals(TIME_LIMIT_S)
     phase_s = phase_of(seed, world.number)
     while _start_distance_m(world, interpolation, phase_s) <= radius_m:
         phase_s += 1.0

@@ -10,7 +10,7 @@ from quad_bench.cli.benchmark_options import body_radius_option, flight_options,
 
 
 @click.command()
-@world_options("barn")
+@world_options("barn", config="barn")
 @click.option("--sample", is_flag=True, help="Fly only the worlds of the official sample.")
 @flight_options
 @body_radius_option(0.20)

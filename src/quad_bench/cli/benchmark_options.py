@@ -60,10 +60,12 @@ _FLIGHTS = (
 )
 
 
-def world_options(benchmark: str) -> Callable[[F], F]:
-    """Return what adds the options of a benchmark with worlds.
+def world_options(benchmark: str, config: str) -> Callable[[F], F]:
+    """Return a decorator that adds the options of a benchmark with worlds.
 
-    Its default configuration and its page in ``docs/`` have its name.
+    Args:
+        benchmark: Its name, and that of its page in ``docs/``.
+        config: Its default configuration.
     """
     options = (
         click.option(
@@ -74,7 +76,7 @@ def world_options(benchmark: str) -> Callable[[F], F]:
         ),
         click.option(
             "--config",
-            default=benchmark,
+            default=config,
             show_default=True,
             metavar="NAME|FOLDER",
             help="move_base's parameters: a shipped configuration or a folder, as the challenge's.",

@@ -14,7 +14,7 @@ PUBLISHED_SPEED_MPS = 0.5
 
 
 @click.command()
-@world_options("dynabarn")
+@world_options("dynabarn", config="moving")
 @click.option(
     "--max-vel-x",
     "max_vel_x_mps",

@@ -167,19 +167,6 @@ _SWITCHES: Tuple[Switch, ...] = (
         (NavigatorParams,),
     ),
     (
-        double(
-            "plan_hysteresis",
-            0.0,
-            "plan_hysteresis_s",
-            "seconds",
-            "The robot takes another way when all plans have led another way for so long; 0 takes"
-            " every new plan.",
-            low=0,
-            high=100,
-        ),
-        (NavigatorParams,),
-    ),
-    (
         flag(
             "plan_inside_map",
             True,
@@ -273,15 +260,6 @@ _SWITCHES: Tuple[Switch, ...] = (
             False,
             "yield_to_strangers",
             "A robot makes room for a tracked obstacle that keeps it from its goal.",
-        ),
-        (PeerParams,),
-    ),
-    (
-        flag(
-            "plan_behind_moving_obstacles",
-            False,
-            "plan_behind_strangers",
-            "Global plans pass behind tracked obstacles.",
         ),
         (PeerParams,),
     ),

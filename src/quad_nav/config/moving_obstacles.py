@@ -131,19 +131,6 @@ MOVING_OBSTACLES: Tuple[Switch, ...] = (
     ),
     (
         double(
-            "moving_obstacle_watch",
-            0.0,
-            "watch_s",
-            "seconds",
-            "Time for which a robot that tracks three or more moving obstacles hovers before its"
-            " first goal and watches them, to learn which motions are periodic.",
-            low=0,
-            high=1000,
-        ),
-        (EvasionParams,),
-    ),
-    (
-        double(
             "moving_obstacle_evasion_speed",
             0.0,
             "speed_mps",

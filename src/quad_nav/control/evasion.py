@@ -36,13 +36,12 @@ from quad_nav.kernels.body_response import rest_s
 from quad_nav.kernels.evasion_commands import BOTH_S, command_costs
 from quad_nav.kernels.space_time import SUBSTEPS, SpaceTime, fill_costs
 from quad_nav.kernels.standing_obstacles import overlap_costs
-from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
 Floats = NDArray[np.float64]
 
 STEP_S = 0.5
-_HORIZON_S, _KNOWN_HORIZON_S = 6.0, 10.0  # the second one where most motions repeat
+_HORIZON_S = 6.0
 _WINDOW_M = 5.0  # the least window, from the robot to each side
 _REACH_CELLS = 2  # cells that the robot flies in a step
 _MAX_CELL_M = 0.2
@@ -76,7 +75,7 @@ def evade(
         last: The last command's velocity along the axes of the costmap's frame, m/s.
     """
     search = _search_of(around.max_speed_mps, around.usual_speed_mps)
-    times_s = prediction_times(around.memory, search.step_s)
+    times_s = prediction_times(search.step_s)
     discs = predicted_discs(params, around, tracks, now_s, times_s)
     is_near = discs.shape[1] or len(tracks.suspects)
     if not is_near and around.is_following and not around.is_fast:
@@ -148,18 +147,14 @@ def predicted_discs(
     reach_m = radii + (speeds + around.max_speed_mps) * float(times_s[-1])
     near = np.hypot(offsets[:, 0], offsets[:, 1]) <= reach_m
     place = around.pose.x_m, around.pose.y_m
-    discs = predict(now.chosen(near), around.memory, times_s, place)
+    discs = predict(now.chosen(near), times_s, place)
     discs[:, :, 2] = discs[:, :, 2] + around.radius_m + params.clearance_m
     return discs
 
 
-def prediction_times(memory: MotionMemory, step_s: float) -> Floats:
-    """Return the times of predictions, five in each step of the search and the end.
-
-    Motions that repeat are known for longer than others: a longer horizon finds ways through.
-    """
-    horizon_s = _KNOWN_HORIZON_S if memory.most_repeat else _HORIZON_S
-    times: Floats = np.arange(round(horizon_s / step_s) * SUBSTEPS + 1) * (step_s / SUBSTEPS)
+def prediction_times(step_s: float) -> Floats:
+    """Return the times of predictions, five in each step of the search and the end."""
+    times: Floats = np.arange(round(_HORIZON_S / step_s) * SUBSTEPS + 1) * (step_s / SUBSTEPS)
     return times
 
 

@@ -15,7 +15,6 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
 from quad_nav.kernels.body_response import Body
 from quad_nav.kernels.standing_obstacles import StandingObstacles, fill_gaps
-from quad_nav.tracking.motion_memory import MotionMemory
 
 Floats = NDArray[np.float64]
 
@@ -33,8 +32,6 @@ class EvasionParams:
         clearance_m: Distance that the robot keeps from where obstacles are predicted.
         glance_rad: Angle by which a robot that evades looks to both sides of its way, for what a
             LIDAR that does not see all around hides; it turns steadily at pi.
-        watch_s: Time for which the robot hovers before its first goal, and watches three or more
-            obstacles.
         speed_mps: Greatest speed while the robot evades; 0 for that of the local planner.
         max_acceleration_mps2: Greatest acceleration of an obstacle: the robot rests before one can
             reach it, see ``control/passive_safety.py``; 0 for no passive safety.
@@ -44,7 +41,6 @@ class EvasionParams:
     avoid_moving_obstacles: bool = False
     clearance_m: float = 0.1
     glance_rad: float = 0.0
-    watch_s: float = 0.0
     speed_mps: float = 0.0
     max_acceleration_mps2: float = 0.0
     walking_mps: float = 1.6
@@ -63,7 +59,6 @@ class Surroundings:
         max_speed_mps: Greatest speed of the robot in any direction, while it evades.
         usual_speed_mps: Greatest speed otherwise.
         is_following: The robot follows a plan; else it stays near a point.
-        memory: The memory of how obstacles have moved.
         period_s: Time between two commands.
         neighbours: The peers.
     """
@@ -76,7 +71,6 @@ class Surroundings:
     max_speed_mps: float
     usual_speed_mps: float
     is_following: bool
-    memory: MotionMemory
     period_s: float
     neighbours: Neighbours = NO_NEIGHBOURS
 

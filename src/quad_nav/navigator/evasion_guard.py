@@ -25,13 +25,11 @@ from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
 from quad_nav.kernels.moving_discs import MovingDiscs
 from quad_nav.navigator.tick import RobotPoses, Tick
-from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
 Floats = NDArray[np.float64]
 
 _AT_POINT_M = 0.15
-_MANY, _LOOK_S = 3, 3.0  # obstacles that are worth watching, and the time until they have tracks
 _ROUTE_POINTS = 40
 _AHEAD_M = 1.5
 _TURN_GAIN_PER_S = 2.0
@@ -66,8 +64,6 @@ class EvasionGuard:
         self.is_evading = False
         self._costmap = local_costmap
         self._last = (0.0, 0.0)
-        self._memory = MotionMemory()
-        self._watches_since_s, self._has_seen_many, self._has_watched = math.inf, False, False
         self._point: Optional[Pose2D] = None  # where a robot that follows no plan stopped
 
     def check(
@@ -96,7 +92,6 @@ class EvasionGuard:
         if poses.in_local is None or poses.in_global is None or local_from_global is None:
             return None
         pose, is_displaced = poses.in_local, self._is_displaced(plan, poses.in_global)
-        self._memory.add(tracks)
         around = self._surroundings(pose, velocity, limits, plan is not None, neighbours)
         if not tracks.any_may_move and not is_displaced and not around.is_fast:
             return self._end(tick)
@@ -126,18 +121,6 @@ class EvasionGuard:
         self._last = pose.rotate(command.vx_mps, command.vy_mps)
         return command
 
-    def watches(self, now_s: float, tracks: Tracks) -> bool:
-        """Return whether the robot hovers before its first goal, to learn how obstacles move."""
-        if self._has_watched:
-            return False
-        self._memory.add(tracks)
-        self._watches_since_s = min(self._watches_since_s, now_s)
-        self._has_seen_many |= len(tracks) >= _MANY
-        watch_s = self.params.watch_s
-        limit_s = watch_s if self._has_seen_many else min(watch_s, _LOOK_S)
-        self._has_watched = now_s - self._watches_since_s >= limit_s
-        return not self._has_watched
-
     def predict(self, now_s: float, pose: Pose2D, tracks: Tracks, rollout_s: float) -> MovingDiscs:
         """Return what a local planner's rollouts of a duration are judged against.
 
@@ -149,9 +132,8 @@ class EvasionGuard:
         """
         if not len(tracks):
             return NO_DISCS
-        self._memory.add(tracks)
         radius_m, clearance_m = self._costmap.inscribed_radius_m, self.params.clearance_m
-        return rollout_discs(tracks.at(now_s), self._memory, pose, radius_m, clearance_m, rollout_s)
+        return rollout_discs(tracks.at(now_s), pose, radius_m, clearance_m, rollout_s)
 
     def _surroundings(
         self,
@@ -171,7 +153,6 @@ class EvasionGuard:
             max_speed_mps=max(self.params.speed_mps, limits.speed_mps),
             usual_speed_mps=limits.speed_mps,
             is_following=is_following,
-            memory=self._memory,
             period_s=self.period_s,
             neighbours=neighbours,
         )

@@ -26,8 +26,6 @@ class NavigatorParams:
             restores upstream behaviour, which commands one control period later.
         stop_while_planning: A robot without a plan stops; False restores upstream behaviour,
             which leaves the last command in force.
-        plan_hysteresis_s: The robot takes another way when all plans have led another way for so
-            long; 0 restores upstream behaviour, which takes every new plan.
         plan_inside_map: Plans keep the robot off the edge of a global costmap that does not roll;
             False restores upstream behaviour, whose plans may lead along the edge.
         progress: Detection of a robot that makes no progress.
@@ -54,7 +52,6 @@ class NavigatorParams:
     escape_collision: bool = True
     command_in_first_cycle: bool = True
     stop_while_planning: bool = True
-    plan_hysteresis_s: float = 0.0
     plan_inside_map: bool = True
     progress: ProgressParams = ProgressParams()
     evasion: EvasionParams = EvasionParams()

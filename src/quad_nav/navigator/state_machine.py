@@ -23,7 +23,6 @@ from quad_nav.navigator.control_supervisor import ControlSupervisor, StuckAction
 from quad_nav.navigator.costmap_updates import CostmapUpdates
 from quad_nav.navigator.evasion_guard import EvasionGuard, speed_limits
 from quad_nav.navigator.params import NavigatorParams
-from quad_nav.navigator.plan_hysteresis import PlanHysteresis
 from quad_nav.navigator.plan_search import PlanSearch
 from quad_nav.navigator.recovery_sequence import NamedRecovery, RecoverySequence
 from quad_nav.navigator.tick import Outcome, RobotPoses, State, Tick, Trigger
@@ -79,7 +78,6 @@ class StateMachine:
         self._updates = updates
         self._peers = peers
         self._search = PlanSearch(params.planner_frequency_hz)
-        self._hysteresis = PlanHysteresis()
         self._cycle = Schedule(params.controller_frequency_hz)
         self._starts_from_rest = False  # no control cycle since an idle robot took a goal
         self._recovery_overruns = False  # the last control cycle fell into a recovery
@@ -173,11 +171,6 @@ class StateMachine:
                 self._stop_without_data(tick, missing)
             return
         follows = tick.control is not None and self.state is State.CONTROLLING
-        if follows and self.guard.watches(tick.now_s, self.control.tracks):
-            tick.command = Twist2D()
-            self.control.restart_timers(tick.now_s)
-            self._peers.restart_patience()
-            return
         plan = self.control.plan if follows else None
         neighbours = self._neighbours(poses, velocity)
         self.guard.check(tick, poses, velocity, self.control.tracks, plan, limits, neighbours)
@@ -215,7 +208,6 @@ class StateMachine:
     def _begin_planning(self, now_s: float, wakes_thread: bool = True) -> None:
         self.state = State.PLANNING
         self._search.begin(now_s, wakes_thread)
-        self._hysteresis.forget()
 
     def _is_search_due(self, now_s: float) -> bool:
         """Return whether to search before the control cycle."""
@@ -231,7 +223,7 @@ class StateMachine:
             if start is None or target is None:
                 raise PlanningError("robot pose unknown")
             with closed_edge(costmap, start, target, self.params.plan_inside_map):
-                plan = self.planner.make_plan(costmap.spec, costmap.costs, start, target)
+                tick.plan = self.planner.make_plan(costmap.spec, costmap.costs, start, target)
         except PlanningError as error:
             tick.planning_failed = str(error)
             if self._peers.holding_point is not None:
@@ -239,11 +231,6 @@ class StateMachine:
             if self.state is State.PLANNING and self._search.fail(tick.now_s, self.params):
                 self._enter_clearing(tick, Trigger.PLANNING)
             return
-        delay_s = self.params.plan_hysteresis_s
-        if delay_s > 0.0:
-            same_way_m = costmap.inscribed_radius_m
-            plan = self._hysteresis.choose(plan, tick.now_s, start, delay_s, same_way_m)
-        tick.plan = plan
         self._peers.follow_plan(tick.plan)
         self._search.succeed(tick.plan, self.state, tick.now_s)
         if not self.recovery.is_running:

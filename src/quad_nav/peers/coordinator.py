@@ -54,7 +54,6 @@ class PeerParams:
         yield_when_idle: A robot without a goal leaves the path of a peer, and comes back.
         roundabouts: Where four robots or more meet, all keep right of a circle.
         yield_to_strangers: Make room for a tracked obstacle that keeps the robot from its goal.
-        plan_behind_strangers: Plans pass behind tracked obstacles.
         stranger_patience_s: Time without progress until the robot makes room for a stranger; a
             random time of up to twice as much is added.
     """
@@ -65,7 +64,6 @@ class PeerParams:
     yield_when_idle: bool = True
     roundabouts: bool = True
     yield_to_strangers: bool = False
-    plan_behind_strangers: bool = False
     stranger_patience_s: float = 3.0
 
 
@@ -235,8 +233,7 @@ class PeerCoordinator:
         messages += self._update_roundabout(now_s, pose, peers)
         if pose is not None and local_from_global is not None:
             in_map = None if strangers is None else _in_map(strangers, local_from_global)
-            crossing = in_map.at(now_s) if in_map and self.params.plan_behind_strangers else None
-            self._update_costs(pose, local_from_global, crossing)
+            self._update_costs(pose, local_from_global)
             self._observe_strangers(now_s, pose, in_map)
         return messages
 
@@ -249,13 +246,11 @@ class PeerCoordinator:
             return self._roundabout.update(now_s, pose, peers, self.params.timeout_s)
         return []
 
-    def _update_costs(
-        self, pose: Pose2D, local_from_global: Pose2D, crossing: Optional[Tracks]
-    ) -> None:
+    def _update_costs(self, pose: Pose2D, local_from_global: Pose2D) -> None:
         in_roundabout = self._roundabout.centre is not None
-        costs = bool(self._tracker.peers) or in_roundabout or crossing is not None
+        costs = bool(self._tracker.peers) or in_roundabout
         if costs or self._has_costs:
-            self._costs.update(pose, local_from_global, self.priority, crossing)
+            self._costs.update(pose, local_from_global, self.priority)
         self._has_costs = costs
 
     def _observe_strangers(self, now_s: float, pose: Pose2D, strangers: Optional[Tracks]) -> None:
@@ -354,10 +349,6 @@ class PeerCoordinator:
             self._tracker.safety_radius_m,
             control_period_s + LATENCY_S,
         )
-
-    def restart_patience(self) -> None:
-        """Count progress anew, for a robot that hovers for a while."""
-        self._stand_off.start_goal()
 
     def neighbours(
         self, pose: Pose2D, velocity: Twist2D, local_from_map: Pose2D, control_period_s: float

@@ -1,16 +1,15 @@
 """Peers in the costmaps: areas of cost around them, and no obstacles from their LIDAR points.
 
 In the global costmap, places near a stationary peer and along the path of a peer of higher
-priority cost more, so plans avoid them where there is room. So do places ahead of tracked
-obstacles that the robot can reach before these have passed: plans pass behind them. So does the
-circle of a roundabout with all to its left: plans keep right. In the local costmap, stationary
+priority cost more, so plans avoid them where there is room. So does the circle of a roundabout with
+all to its left: plans keep right. In the local costmap, stationary
 peers and the circle are obstacles. Obstacle layers ignore LIDAR points on known peers.
 """
 
 from __future__ import annotations
 
 import math
-from typing import List, Optional
+from typing import List
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,14 +23,11 @@ from quad_nav.kernels.peers import reached_in_time
 from quad_nav.peers.peer_tracker import TOLERANCE_M, PeerTracker
 from quad_nav.peers.right_of_way import HORIZON_S, TIME_TOLERANCE_S, predict_peer
 from quad_nav.peers.roundabout import Roundabout
-from quad_nav.tracking.tracks import Tracks
 
 _SAME_FRAME = Pose2D(0.0, 0.0, 0.0)
 _LIDAR_TOLERANCE_M = 0.15  # points so far outside of a peer's circle still belong to it
 _OUTSIDE_M = 0.05
 _STATIONARY_COST, _PATH_COST = 120, 100
-_CROSSING_TIMES_S = np.arange(0.0, 4.0, 0.25)
-"""For which what says nothing is expected to keep its velocity."""
 _PATH_TIMES_S = np.arange(0.0, HORIZON_S + TIME_TOLERANCE_S, 0.25)
 
 
@@ -49,20 +45,13 @@ class PeerCosts:
         self._tracker, self._roundabout = tracker, roundabout
         self._global, self._local = global_costmap, local_costmap
 
-    def update(
-        self,
-        pose: Pose2D,
-        local_from_global: Pose2D,
-        priority: float,
-        strangers: Optional[Tracks] = None,
-    ) -> None:
+    def update(self, pose: Pose2D, local_from_global: Pose2D, priority: float) -> None:
         """Update the layers; they take effect with the costmaps' next update.
 
         Args:
             pose: Pose of the robot in ``map``.
             local_from_global: Transform from ``map`` to the frame of the local costmap.
             priority: Priority of the robot.
-            strangers: Moving obstacles now, in ``map``, that plans pass behind.
         """
         peers = self._tracker.peers
         newcomers = [k for k, peer in enumerate(peers) if peer.name in self._tracker.newcomers]
@@ -74,8 +63,6 @@ class PeerCosts:
             in_local = in_global.copy()
             in_local[:, :2] = local_from_global.transform_points(in_global[:, :2])
         costly = self._areas(in_global[:, :2], pose, priority)
-        if strangers is not None:
-            costly += self._crossings(strangers, pose)
         for costmap, circles, areas in (
             (self._global, in_global, costly),
             (self._local, in_local, self._obstacles(in_local[:, :2], pose, local_from_global)),
@@ -114,23 +101,6 @@ class PeerCosts:
         if self._roundabout.centre is not None:
             barrier = self._roundabout.barrier(pose)
             areas.append(PeerArea(barrier, self._roundabout.radius_m, _PATH_COST))
-        return areas
-
-    def _crossings(self, strangers: Tracks, pose: Pose2D) -> List[PeerArea]:
-        """Return where moving obstacles will be, as far as the robot can get there before.
-
-        Args:
-            strangers: The obstacles in ``map``; they are expected to keep their velocities.
-            pose: Pose of the robot in ``map``.
-        """
-        areas: List[PeerArea] = []
-        for (x_m, y_m, vx_mps, vy_mps), radius_m in zip(strangers.states, strangers.radii_m):
-            path = np.column_stack(
-                [x_m + vx_mps * _CROSSING_TIMES_S, y_m + vy_mps * _CROSSING_TIMES_S]
-            )
-            reach_m = self._tracker.radius_m + float(radius_m) + TOLERANCE_M
-            met = places_met(path, _CROSSING_TIMES_S, pose, reach_m, self._tracker.cruise_mps)
-            areas += [PeerArea(met, reach_m, _PATH_COST)] if len(met) else []
         return areas
 
     def _obstacles(

@@ -33,7 +33,6 @@ from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import RobotPoses
 from quad_nav.peers.peer import HIGHEST_PRIORITY, Intention, Peer
 from quad_nav.scenario.assembly import build_navigator
-from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracker import ObstacleTracker
 from quad_nav.tracking.tracks import TrackerParams, Tracks
 
@@ -102,22 +101,15 @@ def track_obstacle() -> None:
 
 
 def evade_obstacle() -> None:
-    """Evade an obstacle that comes every ten seconds, and its replay: every kernel is called."""
-    memory = MotionMemory()
-    well_seen = 1e-4 * np.eye(4)[np.newaxis]  # the memory keeps nothing else
-    one = Tracks(0.0, np.array([0]), np.zeros((1, 4)), well_seen, np.array([0.3]))
-    for step in range(96):
-        number, at = divmod(step, 24)
-        states = np.array([[2.0 - 0.1 * at, 0.0, -1.0, 0.0]])
-        now_s = 10.0 * number + 0.1 * at
-        one = replace(one, time_s=now_s, numbers=np.array([number]), states=states)
-        memory.add(one)
+    """Evade an obstacle that comes, so that every kernel is called."""
+    states = np.array([[2.0, 0.0, -1.0, 0.0]])
+    one = Tracks(0.0, np.array([0]), states, np.zeros((1, 4, 4)), np.array([0.3]))
     spec = GridSpec(40, 40, 0.1, -2.0, -2.0)
     costs = np.zeros(spec.shape, np.uint8)
     still = Pose2D(0.0, 0.0), Twist2D()
-    around = Surroundings(spec, costs, *still, 0.3, 0.5, 0.5, False, memory, period_s=0.1)
+    around = Surroundings(spec, costs, *still, 0.3, 0.5, 0.5, False, period_s=0.1)
     params = EvasionParams(True, max_acceleration_mps2=6.0)
-    evade(params, around, one, one.time_s, np.zeros((1, 2)), Twist2D(), (0.0, 0.0))
+    evade(params, around, one, 0.0, np.zeros((1, 2)), Twist2D(), (0.0, 0.0))
 
 
 def _oncoming_peer(here: Pose2D, now_s: float) -> Peer:

@@ -13,7 +13,6 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
 from quad_nav.peers.peer import Peer
 from quad_nav.peers.voronoi_cell import limit_to_cell, neighbours_of
-from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
 HERE = Pose2D(0.0, 0.0)
@@ -71,9 +70,7 @@ def test_an_evasion_takes_the_side_that_peers_leave_free():
     def evaded(neighbours):
         spec = GridSpec(160, 160, 0.05, -4.0, -4.0)
         costs = np.zeros(spec.shape, np.uint8)
-        around = Surroundings(
-            spec, costs, HERE, Twist2D(), 0.25, 0.5, 0.5, False, MotionMemory(), 0.1, neighbours
-        )
+        around = Surroundings(spec, costs, HERE, Twist2D(), 0.25, 0.5, 0.5, False, 0.1, neighbours)
         states = np.array([[2.0, 0.05, -1.0, 0.0]])
         coming = Tracks(0.0, np.arange(1), states, np.zeros((1, 4, 4)), np.full(1, 0.3))
         params = EvasionParams(True, clearance_m=0.1)

@@ -22,7 +22,6 @@ from quad_nav.plan.global_planner import SearchPlanner
 from quad_nav.scenario import warm_up
 from quad_nav.scenario.assembly import GLOBAL_PLANNERS, LOCAL_PLANNERS
 from quad_nav.sim import casters
-from quad_nav.tracking.motion_memory import MotionMemory
 
 
 @pytest.fixture
@@ -95,20 +94,6 @@ def test_every_kernel_that_python_calls_is_compiled():
         pytest.skip("nothing is compiled")
     warm_up.fly_missions()
     assert {name for name, kernel in kernels_called_in_python().items() if is_cold(kernel)} == set()
-
-
-def test_the_memory_of_motion_is_warmed_up(monkeypatch):
-    """The kernels are called only if the memory keeps what it is shown and recalls it."""
-    recall, known = MotionMemory.recall, []
-
-    def count(memory, number, times_s):
-        recalled = recall(memory, number, times_s)
-        known.append(recalled.known)
-        return recalled
-
-    monkeypatch.setattr(MotionMemory, "recall", count)
-    warm_up.evade_obstacle()
-    assert known and min(known) > 0
 
 
 def is_cold(kernel: object) -> bool:
