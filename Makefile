@@ -62,7 +62,7 @@ first-hour: workspace  ## What a user does first: an own scene, map, robot, goal
 
 # Not in `make test`: Ray is an extra, 70 MB. The cluster is on this machine.
 ray: packages  ## The tests with a Ray cluster, in an environment of their own
-	@scripts/make_venv .venv-ray requirements.txt requirements-test.txt
+	@scripts/make_venv .venv-ray requirements.txt requirements-tune.txt requirements-test.txt
 	@.venv-ray/bin/python3 -m pip install --quiet '.[ray]'
 	PYTHONPATH=src .venv-ray/bin/python3 -m pytest test/ray
 
@@ -123,7 +123,7 @@ packages:  ## Install the system packages
 	@scripts/install_packages $(if $(and $(DISPLAY),$(filter fly,$(MAKECMDGOALS))),--rviz)
 
 venv: packages  ## Make the virtual environment, with the command .venv/bin/quad
-	@scripts/make_venv .venv requirements.txt
+	@scripts/make_venv .venv requirements.txt requirements-tune.txt
 	@scripts/make_command .venv
 
 workspace: venv  ## Build the catkin workspace
