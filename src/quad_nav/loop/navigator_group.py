@@ -24,7 +24,6 @@ from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, sinks_of
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.loop import LoopSetup
 from quad_nav.navigator.tick import RobotPoses, Tick
-from quad_nav.peers.links import PeerLinks
 from quad_nav.peers.peer import Intention, Peer, idle_priority
 from quad_nav.plan.global_planner import SearchPlanner
 from quad_nav.plan.navfn import Navfn
@@ -238,7 +237,6 @@ class NavigatorGroup:
         self._lidars = lidars
         self._start_s = setup.start_step / STEPS_PER_S
         self._frames = self._frames_of(setup.seed)
-        self._links = PeerLinks(setup.links, setup.seed)
         self.lidar_enabled = np.ones(len(setup.names), dtype=bool)
         self.intentions = [Intention(idle_priority(n)) for n in range(len(setup.names))]
         self.last_scans: Dict[int, LocatedScan] = {}
@@ -354,7 +352,6 @@ class NavigatorGroup:
         self._lidars, self._start_s, self._frames = lidars, now_s, self._frames_of(seed)
         for robot in self.robots.values():
             robot.reset(self._frames, now_s, jumped_back)
-        self._links = PeerLinks(self.setup.links, seed)
 
     def close(self) -> None:
         """Free what a subclass holds; nothing is called afterwards."""
@@ -378,9 +375,7 @@ class NavigatorGroup:
             for robot in np.flatnonzero(is_near.any(axis=0)).tolist()
         }
         return {
-            robot: self._links.hear(
-                robot, {other: peers[other] for other in np.flatnonzero(row).tolist()}, now_s
-            )
+            robot: [peers[other] for other in np.flatnonzero(row).tolist()]
             for robot, row in zip(robots, is_near)
         }
 
