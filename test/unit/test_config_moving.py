@@ -23,7 +23,10 @@ def parameters(name):
     [
         (
             "people",
-            {"fixes/moving_obstacle_max_acceleration", "fixes/moving_obstacle_evasion_speed"},
+            {
+                "moving_obstacles/max_acceleration",
+                "moving_obstacles/evasion_speed",
+            },
         ),
         (
             "dynabarn",
@@ -31,10 +34,10 @@ def parameters(name):
                 "robot_radius",
                 *(f"global_costmap/{name}" for name in ("width", "height", "origin_x", "origin_y")),
                 "TrajectoryPlannerROS/max_vel_x",
-                "fixes/moving_obstacle_evasion_speed",
-                "fixes/moving_obstacle_timeout",
-                "fixes/moving_obstacle_watch",
-                "fixes/yield_to_strangers",
+                "moving_obstacles/evasion_speed",
+                "moving_obstacles/timeout",
+                "moving_obstacles/watch",
+                "peers/yield_to_strangers",
             },
         ),
     ],

@@ -136,7 +136,7 @@ def test_the_speed_limit(worlds, given, limit):
 @pytest.mark.parametrize("given, speed, body", [(None, 0.0, 0.5), (0.4, 0.4, 0.5), (0.9, 0.9, 0.9)])
 def test_evasions_keep_to_the_speed_limit_unless_another_one_is_set(worlds, given, speed, body):
     """`config/moving` evades at up to 1 m/s."""
-    parameters = () if given is None else (("fixes/moving_obstacle_evasion_speed", given),)
+    parameters = () if given is None else (("moving_obstacles/evasion_speed", given),)
     asked = options(worlds, config="moving", parameters=parameters)
     contestant = read_dynamic_setup(asked, "spline", 0.5).contestant
     assert contestant.configuration.navigator.evasion.speed_mps == speed
@@ -188,7 +188,7 @@ def test_a_robot_watches_before_it_flies(tmp_path):
     """Three obstacles run to and fro far from its way: it leaves after 6 s, then flies 38 s."""
     paths = [([0.0, 8.0, 16.0], [[5.0, y], [-5.0, y], [5.0, y]]) for y in (6.0, 7.5, 9.0)]
     path = write_worlds(tmp_path / "w.npz", w0=(0, *paths))
-    parameters = (("fixes/moving_obstacle_watch", 6.0),)
+    parameters = (("moving_obstacles/watch", 6.0),)
     asked = options(path, config="moving", parameters=parameters)
     setup = read_dynamic_setup(asked, "linear", 0.5)
     run = fly_world(setup.contestant, setup.worlds[0], "linear", 0)

@@ -16,7 +16,7 @@ LAYERS = [
     {"errors"},
     {"versions"},
     {"__init__"},  # quad_nav.__version__
-    {"geometry", "grid", "files"},
+    {"geometry", "grid", "files", "parameter"},
     {"footprint", "timing", "results"},
     {"kernels"},
     {"tracking"},

@@ -23,7 +23,7 @@ POSE, MAP = Pose2D(2.0, 5.0), Pose2D(0.0, 0.0)
 
 
 def navigator(is_on: bool):
-    return build_navigator(load({**TREE, "fixes": {"plan_behind_moving_obstacles": is_on}}))
+    return build_navigator(load({**TREE, "peers": {"plan_behind_moving_obstacles": is_on}}))
 
 
 def crossing(y_m: float, vy_mps: float, x_m: float = 3.5) -> Tracks:

@@ -16,11 +16,11 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "src" / "quad_nav"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
-MOST_LOOSE_MODULES = 8  # directly in quad_nav
+MOST_LOOSE_MODULES = 9  # directly in quad_nav
 MOST_LINES = 400
 MOST_FUNCTION_LINES = 40  # signature and docstring included, kernels apart
 SMALL_LINES = 60
-MOST_SMALL_MODULES = 8  # apart from the text that introduces a package
+MOST_SMALL_MODULES = 9  # apart from the text that introduces a package
 PRINTS_ITS_OWN = ("config/reference.py",)  # our own documentation
 
 
