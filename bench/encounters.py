@@ -2,7 +2,7 @@
 
     python bench/encounters.py                            # all of them, 20 seeds each
     python bench/encounters.py corridor 8in12 --seeds 100 --jobs 4
-    python bench/encounters.py --config moving --set fixes/avoid_peers=false
+    python bench/encounters.py --config moving --set peers/avoid_peers=false
 
 ``mission`` is the tutorial's mission, ``8in12`` are eight quadcopters with a random mission in an
 arena of 12 m; the other names are those of ``goals/encounters``. Starts are displaced by up to

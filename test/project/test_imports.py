@@ -21,7 +21,7 @@ LAYERS = [
     {"errors"},
     {"versions"},
     {"__init__"},  # quad_nav.__version__
-    {"geometry", "grid", "files"},
+    {"geometry", "grid", "files", "parameter"},
     {"footprint", "timing"},
     {"kernels"},
     {"tracking"},

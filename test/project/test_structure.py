@@ -17,7 +17,7 @@ SOURCES = ROOT / "src"
 PACKAGE = SOURCES / "quad_nav"
 MODULES = sorted(SOURCES.rglob("*.py"))
 
-MOST_LOOSE_MODULES = 8  # directly in quad_nav
+MOST_LOOSE_MODULES = 9  # directly in quad_nav
 MOST_LINES = 400
 MOST_FUNCTION_LINES = 40  # signature and docstring included, kernels apart
 PRINTS_ITS_OWN = ("quad_nav/config/reference.py",)  # our own documentation

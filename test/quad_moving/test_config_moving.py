@@ -23,7 +23,10 @@ def parameters(name):
     [
         (
             "people",
-            {"fixes/moving_obstacle_max_acceleration", "fixes/moving_obstacle_evasion_speed"},
+            {
+                "moving_obstacles/max_acceleration",
+                "moving_obstacles/evasion_speed",
+            },
         ),
     ],
 )

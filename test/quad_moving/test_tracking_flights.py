@@ -22,7 +22,7 @@ from quad_nav.tracking.tracker import ObstacleTracker
 from quad_nav.tracking.tracks import TrackerParams
 
 ROOT = Path(__file__).resolve().parents[2]
-ON = (("fixes/track_moving_obstacles", True),)
+ON = (("moving_obstacles/track_moving_obstacles", True),)
 ENCOUNTERS = ROOT / "scenes" / "encounters"
 
 
@@ -126,7 +126,7 @@ def test_a_walker_that_stops_is_an_obstacle_again():
 
 def test_known_peers_are_left_out_and_lost_ones_are_tracked():
     scene, goals = "scenes/encounters/swap.yaml", "goals/encounters/swap"
-    for parameters, is_tracked in ((ON, False), ((*ON, ("fixes/avoid_peers", False)), True)):
+    for parameters, is_tracked in ((ON, False), ((*ON, ("peers/avoid_peers", False)), True)):
         counts = [
             len(flight.offline_robots[0].tracker.tracks)
             for flight in fly_for(setup_of(scene, goals, parameters, 2), 10.0)

@@ -60,7 +60,7 @@ class Tracking(FlightCase):
     def test_3_tracking_is_switched_off_in_flight(self):
         clouds = self.record("/move_base0/moving_obstacles_cloud", PointCloud2)
         self.wait(lambda: clouds.messages, "a cloud")
-        client = Client("/move_base0/fixes", timeout=30.0)
+        client = Client("/move_base0/moving_obstacles", timeout=30.0)
         client.update_configuration({"track_moving_obstacles": False})
         self.wait(lambda: clouds.messages[-1].width == 0, "an empty cloud")
         client.update_configuration({"track_moving_obstacles": True})

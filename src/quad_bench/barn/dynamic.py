@@ -45,7 +45,7 @@ PHASE_S = 100.0
 """Phases are from 0 to this."""
 PUBLISHED_SPEED_MPS = 0.5
 """``max_vel_x`` of the published figures."""
-_NO_FASTER_EVASION = ("fixes/moving_obstacle_evasion_speed", 0.0)
+_NO_FASTER_EVASION = ("moving_obstacles/evasion_speed", 0.0)
 PUBLISHED = {"easy": 0.78, "medium": 0.43, "hard": 0.17}
 """Success rates of move_base with DWA in Gazebo, read off Fig. 5 of A. Nair et al., SSRR 2022."""
 

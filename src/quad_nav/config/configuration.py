@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 
 from quad_nav.config.costmaps import costmap_params, normalise_costmap, remark_on_blindness
-from quad_nav.config.fixes import FIXES, FIXES_TABLE, with_fixes
+from quad_nav.config.fixes import GROUPS, group_params, normalise_groups, with_fixes
 from quad_nav.config.notes import CAUTION, MAPPED, OTHER_ROBOT, Notes, Remark, join
 from quad_nav.config.planners import (
     local_planner_frequency,
@@ -18,7 +18,7 @@ from quad_nav.config.planners import (
     planner_params,
 )
 from quad_nav.config.plugins import plugin_name
-from quad_nav.config.reader import fields, normalise, subtree
+from quad_nav.config.reader import Table, made, normalise
 from quad_nav.config.recoveries import (
     NamedTypes,
     RecoveryParams,
@@ -27,7 +27,6 @@ from quad_nav.config.recoveries import (
     normalise_recoveries,
     recoveries,
 )
-from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
 from quad_nav.config.workload import rollout_problem, size_problem
 from quad_nav.control.surroundings import EvasionParams
 from quad_nav.costmap.layered import CostmapParams
@@ -35,7 +34,8 @@ from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.errors import InputError
 from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.params import NavigatorParams
-from quad_nav.peers.coordinator import PeerParams
+from quad_nav.parameter import POSITIVE, fixed_flag, fixed_number, fixed_whole
+from quad_nav.peers.peer_params import PeerParams
 from quad_nav.tracking.tracks import TrackerParams
 
 COSTMAPS = ("global_costmap", "local_costmap")
@@ -53,10 +53,9 @@ class Configuration:
         recoveries: (name, parameters) in the order in which they are tried.
         local_planner_period_s: Control period that rollouts assume; as in move_base it may differ
             from the period of the control loop.
-        clearing_radius_m: Half the side of the square that ``make_plan`` clears around the robot.
-        body_radius_m: Radius of the simulated body; None for a quadcopter's own.
-        robot: Number of the robot among the ``robots`` that fly together.
-        robots: Number of these; 0 for those that are found on the ROS graph.
+        body_radius_m: None for a quadcopter's own.
+        robot: If unset, the number in the node's name, its frames or its topics.
+        robots: The peers are the other numbers below it; 0 for those on the ROS graph.
         remarks: Remarks on parameters that are legal and odd.
         tree: The normalised tree, with ROS spellings.
         tree_at_start: The tree that ``restore_defaults`` restores.
@@ -72,10 +71,19 @@ class Configuration:
     local_planner: Any
     recoveries: Tuple[Tuple[str, RecoveryParams], ...]
     local_planner_period_s: float
-    clearing_radius_m: float
-    body_radius_m: Optional[float] = None
-    robot: int = 0
-    robots: int = 0
+    clearing_radius_m: float = fixed_number(
+        "clearing_radius", None, "metres", "Half the side of the square that make_plan clears."
+    )
+
+    # Our own
+    body_radius_m: Optional[float] = fixed_number(
+        "body_radius", None, "metres", "Radius of the simulated body.", POSITIVE, own=True
+    )
+    robot: int = fixed_whole("robot", 0, "Number of this robot, see peers.md.", low=0, own=True)
+    robots: int = fixed_whole("robots", 0, "Number of robots, see peers.md.", low=0, own=True)
+    size_from_scene: bool = fixed_flag(
+        "size_from_scene", False, "The global costmap has the size of the scene.", own=True
+    )
     remarks: Tuple[Remark, ...] = ()
     tree: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     tree_at_start: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
@@ -96,6 +104,9 @@ class Configuration:
         Reconfigurable parameters have their value in force; others are there if they were set.
         """
         return copy.deepcopy(dict(self.tree))
+
+
+MOVE_BASE_TABLE = Table((NavigatorParams, Configuration), restores=True)
 
 
 def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
@@ -144,11 +155,11 @@ def _made(
 ) -> Configuration:
     """Make the dataclasses of a normalised tree."""
     pruned = _without_empty(tree)
-    return Configuration(
+    return made(
+        Configuration,
+        tree,
         navigator=navigator_params(tree, listed, given),
-        peers=with_fixes(PeerParams(), tree),
-        scan_validator=with_fixes(ScanValidatorParams(), tree),
-        tracker=with_fixes(TrackerParams(), tree),
+        **own_params(tree),
         global_costmap=costmap_params(tree, "global_costmap"),
         local_costmap=costmap_params(tree, "local_costmap"),
         global_planner=planner_params(tree, "base_global_planner"),
@@ -156,9 +167,6 @@ def _made(
         recoveries=recoveries(tree, listed),
         local_planner_period_s=local_planner_period_s(tree),
         clearing_radius_m=tree.get("clearing_radius", circumscribed_radius_m(tree)),
-        body_radius_m=tree.get("body_radius"),
-        robot=tree.get("robot", 0),
-        robots=tree.get("robots", 0),
         tree=pruned,
         tree_at_start=pruned,
     )
@@ -174,13 +182,24 @@ def navigator_params(
         listed: (name, type) of the ``recovery_behaviors``, None without that list.
         given: The keys that were set.
     """
-    params = NavigatorParams(
+    params = made(
+        NavigatorParams,
+        tree,
+        given,
         recovery_behaviors=listed,
-        progress=with_fixes(ProgressParams(), tree),
-        evasion=with_fixes(EvasionParams(), tree),
-        **fields(tree, MOVE_BASE_TABLE.parameters, given),
+        progress=group_params(ProgressParams, "progress", tree),
+        evasion=group_params(EvasionParams, "moving_obstacles", tree),
     )
     return with_fixes(params, tree)
+
+
+def own_params(tree: Mapping[str, Any]) -> Dict[str, Any]:
+    """Make the dataclasses of our own groups that are fields of a ``Configuration``."""
+    return {
+        "peers": group_params(PeerParams, "peers", tree),
+        "scan_validator": group_params(ScanValidatorParams, "scan_validator", tree),
+        "tracker": group_params(TrackerParams, "moving_obstacles", tree),
+    }
 
 
 def _normalise(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
@@ -188,7 +207,7 @@ def _normalise(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
     normalise_planner_names(tree, notes)
     known = [
         *COSTMAPS,
-        FIXES,
+        *GROUPS,
         OTHER_ROBOT,
         *planner_keys(tree),
         *_INHERITED,
@@ -197,7 +216,7 @@ def _normalise(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
     ]
     normalise(tree, "", MOVE_BASE_TABLE, notes, also_known=known)
     normalise_planners(tree, notes)
-    normalise(subtree(tree, FIXES, "", notes), FIXES, FIXES_TABLE, notes)
+    normalise_groups(tree, notes)
     for name in COSTMAPS:
         normalise_costmap(tree, name, notes)
     return normalise_recoveries(tree, notes)

@@ -8,20 +8,20 @@ before ROS Hydro) layer parameters are among the costmap's own, and move_base mo
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Dict, List, Mapping, Set, Tuple
 
 from quad_nav.config.fixes import with_fixes
 from quad_nav.config.layers import LAYERS, PARENT_PARAMETERS, layer_params, normalise_layer
 from quad_nav.config.notes import CAUTION, IGNORED, UNSUPPORTED, Notes, join
 from quad_nav.config.plugins import PluginLayerParams, is_dotted
-from quad_nav.config.reader import Namespace, fields, normalise, subtree
-from quad_nav.config.spec import Table
-from quad_nav.config.tables.costmap import COSTMAP_TABLE
-from quad_nav.config.texts import polygon_from_list, text_from_polygon
+from quad_nav.config.reader import Namespace, Table, made, normalise, subtree
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
+from quad_nav.files.number_texts import polygon_from_list, text_from_polygon
 
+COSTMAP_TABLE = Table((CostmapParams,))
 OBSTACLE, VOXEL = "costmap_2d::ObstacleLayer", "costmap_2d::VoxelLayer"
 STATIC, INFLATION = "costmap_2d::StaticLayer", "costmap_2d::InflationLayer"
 _OLD_STYLE = ("static_map", "map_type")
@@ -66,7 +66,7 @@ def costmap_params(tree: Mapping[str, Any], name: str) -> CostmapParams:
         params = layer_params(costmap, name, plugin["name"], plugin["type"])
         if params is not None:
             layers.append((plugin["name"], with_fixes(params, tree)))
-    return CostmapParams(layers=tuple(layers), **fields(costmap, COSTMAP_TABLE.parameters))
+    return made(CostmapParams, costmap, layers=tuple(layers))
 
 
 def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:
@@ -215,5 +215,4 @@ def _table_with_misplaced(costmap: Namespace, known: Set[str]) -> Table:
     for key, value in costmap.items():
         if isinstance(value, dict) and key not in known:
             misplaced.setdefault(key, "plugins has no layer of this name")
-    base = COSTMAP_TABLE
-    return Table(base.reconfigurable, base.fixed, base.unsupported, tuple(misplaced.items()))
+    return replace(COSTMAP_TABLE, ignored=misplaced)

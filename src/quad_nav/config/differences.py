@@ -5,20 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Dict, Iterator, Mapping, Tuple
 
-from quad_nav.config.configuration import COSTMAPS
+from quad_nav.config.configuration import COSTMAPS, MOVE_BASE_TABLE
+from quad_nav.config.costmaps import COSTMAP_TABLE
 from quad_nav.config.files import ParameterTree, set_value
-from quad_nav.config.fixes import FIXES, FIXES_TABLE
-from quad_nav.config.layers import LAYERS
+from quad_nav.config.fixes import GROUPS
+from quad_nav.config.layers import LAYERS, SOURCE_TABLE
 from quad_nav.config.notes import join
 from quad_nav.config.planners import SLOTS, planner_type
 from quad_nav.config.plugins import plugin_name
+from quad_nav.config.reader import Table
+from quad_nav.config.recoveries import CLEAR, full_type
 from quad_nav.config.recoveries import TABLES as RECOVERY_TABLES
-from quad_nav.config.recoveries import full_type
-from quad_nav.config.spec import Table
-from quad_nav.config.tables.costmap import COSTMAP_TABLE
-from quad_nav.config.tables.layers import SOURCE_TABLE
-from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
-from quad_nav.config.tables.recoveries import CLEAR_COSTMAP_TABLE
 
 Namespaced = Tuple[str, Table, Mapping[str, Any]]
 
@@ -44,7 +41,7 @@ def known_parameters(tree: Mapping[str, Any]) -> Dict[str, Any]:
     """
     known = ParameterTree()
     for path, table, namespace in (*_namespaces(tree), *_default_recoveries(tree)):
-        lists = ("layer_names",) if table is CLEAR_COSTMAP_TABLE else ()
+        lists = ("layer_names",) if table is RECOVERY_TABLES[CLEAR] else ()
         for name in (*(parameter.name for parameter in table.parameters), *lists):
             if name in namespace:
                 set_value(known, join(path, name), namespace[name], "")
@@ -95,13 +92,14 @@ def _namespaces(tree: Mapping[str, Any]) -> Iterator[Namespaced]:
         table = RECOVERY_TABLES.get(full_type(entry["type"]))
         if table is not None:
             yield entry["name"], table, _below(tree, entry["name"])
-    yield FIXES, FIXES_TABLE, _below(tree, FIXES)
+    for group, table in GROUPS.items():
+        yield group, table, _below(tree, group)
 
 
 def _default_recoveries(tree: Mapping[str, Any]) -> Iterator[Namespaced]:
     if "recovery_behaviors" not in tree:
         for name in ("conservative_reset", "aggressive_reset"):
-            yield name, CLEAR_COSTMAP_TABLE, _below(tree, name)
+            yield name, RECOVERY_TABLES[CLEAR], _below(tree, name)
 
 
 def _layers(path: str, costmap: Mapping[str, Any]) -> Iterator[Namespaced]:
@@ -109,7 +107,7 @@ def _layers(path: str, costmap: Mapping[str, Any]) -> Iterator[Namespaced]:
         if plugin["type"] not in LAYERS:
             continue
         place, layer = join(path, plugin["name"]), _below(costmap, plugin["name"])
-        yield place, LAYERS[plugin["type"]].table, layer
+        yield place, LAYERS[plugin["type"]], layer
         for source in str(layer.get("observation_sources", "")).split():
             yield join(place, source), SOURCE_TABLE, _below(layer, source)
 

@@ -8,19 +8,19 @@ from typing import Any, Dict, List, Mapping, Tuple
 
 from quad_nav.config.configuration import (
     COSTMAPS,
+    MOVE_BASE_TABLE,
     Configuration,
     navigator_params,
+    own_params,
     workload_problems,
 )
-from quad_nav.config.costmaps import costmap_params
-from quad_nav.config.fixes import FIXES, FIXES_TABLE, with_fixes
+from quad_nav.config.costmaps import COSTMAP_TABLE, costmap_params
+from quad_nav.config.fixes import GROUPS
 from quad_nav.config.layers import layer_tables
 from quad_nav.config.notes import join
 from quad_nav.config.planners import SLOTS, planner_params, reconfigurable_planners
-from quad_nav.config.spec import InvalidValue, Parameter
-from quad_nav.config.tables.costmap import COSTMAP_TABLE
-from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
 from quad_nav.errors import InputError
+from quad_nav.parameter import InvalidValue, Parameter
 
 _GROUPS = "groups"  # dynamic_reconfigure's own bookkeeping among the values
 _RESTORE = "restore_defaults"
@@ -36,7 +36,7 @@ def reconfigurable(configuration: Configuration) -> Dict[str, Tuple[Parameter, .
         namespaces[costmap] = COSTMAP_TABLE
         for layer, table in layer_tables(configuration.tree[costmap]["plugins"]).items():
             namespaces[join(costmap, layer)] = table
-    namespaces[FIXES] = FIXES_TABLE
+    namespaces.update(GROUPS)
     return {name: table.reconfigurable for name, table in namespaces.items()}
 
 
@@ -124,8 +124,8 @@ def _remade(configuration: Configuration, namespace: str) -> Configuration:
     if namespace == "":
         listed = configuration.navigator.recovery_behaviors
         return replace(configuration, navigator=navigator_params(tree, listed, given=tree))
-    if namespace == FIXES:
-        return _with_other_fixes(configuration)
+    if namespace in GROUPS:
+        return _with_other_groups(configuration)
     if namespace in reconfigurable_planners(tree):
         return replace(
             configuration,
@@ -139,20 +139,15 @@ def _remade(configuration: Configuration, namespace: str) -> Configuration:
     return replace(configuration, local_costmap=params)
 
 
-def _with_other_fixes(configuration: Configuration) -> Configuration:
-    """Set the switches anew in every part that may change in flight: recoveries may not."""
-    tree, navigator = configuration.tree, configuration.navigator
+def _with_other_groups(configuration: Configuration) -> Configuration:
+    """Make every part anew that may change in flight: recoveries may not."""
+    tree, before = configuration.tree, configuration.navigator
+    navigator = navigator_params(tree, before.recovery_behaviors, given=tree)
     return replace(
         configuration,
-        navigator=replace(
-            with_fixes(navigator, tree),
-            progress=with_fixes(navigator.progress, tree),
-            evasion=with_fixes(navigator.evasion, tree),
-        ),
-        peers=with_fixes(configuration.peers, tree),
-        scan_validator=with_fixes(configuration.scan_validator, tree),
-        tracker=with_fixes(configuration.tracker, tree),
-        local_planner=with_fixes(configuration.local_planner, tree),
+        navigator=replace(navigator, controller_patience_s=before.controller_patience_s),
+        local_planner=planner_params(tree, "base_local_planner"),
+        **own_params(tree),
         global_costmap=costmap_params(tree, "global_costmap"),
         local_costmap=costmap_params(tree, "local_costmap"),
     )

@@ -15,6 +15,8 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
 from quad_nav.kernels.body_response import Body
 from quad_nav.kernels.standing_obstacles import StandingObstacles, fill_gaps
+from quad_nav.parameter import flag, number
+from quad_nav.tracking.tracks import max_acceleration
 
 Floats = NDArray[np.float64]
 
@@ -28,22 +30,25 @@ class EvasionParams:
     """Parameters of the evasion of moving obstacles, see ``docs/moving_obstacles.md``.
 
     Attributes:
-        avoid_moving_obstacles: Evade tracked obstacles; False restores upstream behaviour.
-        clearance_m: Distance that the robot keeps from where obstacles are predicted.
-        glance_rad: Angle by which a robot that evades looks to both sides of its way, for what a
-            LIDAR that does not see all around hides; it turns steadily at pi.
-        speed_mps: Greatest speed while the robot evades; 0 for that of the local planner.
-        max_acceleration_mps2: Greatest acceleration of an obstacle: the robot rests before one can
-            reach it, see ``control/passive_safety.py``; 0 for no passive safety.
+        glance_rad: For what a LIDAR that does not see all around hides.
+        max_acceleration_mps2: For passive safety, see ``control/passive_safety.py``.
         walking_mps: Greatest speed of an obstacle then, unless it is faster already.
     """
 
-    avoid_moving_obstacles: bool = False
-    clearance_m: float = 0.1
-    glance_rad: float = 0.0
-    speed_mps: float = 0.0
-    max_acceleration_mps2: float = 0.0
-    walking_mps: float = 1.6
+    avoid_moving_obstacles: bool = flag(
+        "avoid_moving_obstacles", False, "Evade tracked obstacles.", upstream=False
+    )
+    clearance_m: float = number(
+        "clearance", 0.1, "metres", 0, 2, "Distance from predicted obstacles."
+    )
+    glance_rad: float = number(
+        "glance", 0.0, "radians", 0, 3.1416, "Look so far to both sides of the way."
+    )
+    speed_mps: float = number("evasion_speed", 0.0, "metres/s", 0, 10, "0 for the local planner's.")
+    max_acceleration_mps2: float = max_acceleration()
+    walking_mps: float = number(
+        "max_speed", 1.6, "metres/s", 0.1, 10, "Greatest speed of obstacles then."
+    )
 
 
 @dataclass(frozen=True)

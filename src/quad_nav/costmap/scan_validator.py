@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from quad_nav.costmap.observation import SourceParams
 from quad_nav.geometry import Pose3D, Scan, angle_difference
 from quad_nav.kernels.projection import count_returns
+from quad_nav.parameter import flag
 
 _ELSEWHERE_M, _ELSEWHERE_RAD = 0.05, 0.05
 # A larger step of the pose from one scan to the next is a correction of the localisation.
@@ -34,13 +35,11 @@ _ALL_AROUND_RAD = 2.0 * math.pi * 0.98
 
 @dataclass(frozen=True)
 class ScanValidatorParams:
-    """Parameters of the scan validation.
+    """Parameters of the scan validation."""
 
-    Attributes:
-        reject_implausible_scans: Reject them; upstream move_base takes every scan.
-    """
-
-    reject_implausible_scans: bool = True
+    reject_implausible_scans: bool = flag(
+        "reject_implausible_scans", True, "Reject scans that cannot be true.", upstream=False
+    )
 
 
 class ScanValidator:

@@ -25,6 +25,7 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.kernels.moving_discs import MovingDiscs
 from quad_nav.navigator.parameter_limiter import ParameterLimiter
 from quad_nav.navigator.tick import RobotPoses, Tick
+from quad_nav.parameter import number
 from quad_nav.recovery import ParameterLimit
 from quad_nav.timing import StallTimer
 from quad_nav.tracking.tracks import Tracks
@@ -34,17 +35,26 @@ from quad_nav.tracking.tracks import Tracks
 class ProgressParams:
     """Parameters of the progress checker.
 
-    Attributes:
-        timeout_s: Seconds within ``distance_m`` until a new plan, and as many again until
-            the recoveries; 0 disables the checker, as upstream.
-        distance_m: A robot that has moved so far makes progress.
-        stuck_cost_factor: Factor of the obstacle weight from the new plan on, until the
-            robot has moved by the oscillation distance; 1 keeps the weight.
+    A robot that stays within ``distance_m`` for ``timeout_s`` gets a new plan; from then on
+    ``stuck_cost_factor`` weighs obstacles less until it has moved by the oscillation distance.
+    After the same time again it runs the recoveries.
     """
 
-    timeout_s: float = 10.0
-    distance_m: float = 0.1
-    stuck_cost_factor: float = 0.1
+    timeout_s: float = number(
+        "timeout",
+        10.0,
+        "seconds",
+        0,
+        100,
+        "Time until a stuck robot replans; 0: never.",
+        upstream=0.0,
+    )
+    distance_m: float = number(
+        "distance", 0.1, "metres", 0, 10, "A robot that has moved so far makes progress."
+    )
+    stuck_cost_factor: float = number(
+        "stuck_cost_factor", 0.1, "", 0, 1, "Factor of occdist_scale then.", upstream=1.0
+    )
 
 
 class StuckAction(enum.Enum):

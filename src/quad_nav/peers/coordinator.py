@@ -25,6 +25,7 @@ from quad_nav.peers.peer import (
     resample,
 )
 from quad_nav.peers.peer_costs import PeerCosts
+from quad_nav.peers.peer_params import PeerParams
 from quad_nav.peers.peer_tracker import PeerTracker
 from quad_nav.peers.right_of_way import STRANGER, Yield, YieldDecision
 from quad_nav.peers.roundabout import Roundabout
@@ -40,31 +41,6 @@ REPLAN_AFTER_S = 3.0  # of limited commands without progress
 _PROGRESS_M = 0.2
 _AT_HOLDING_POINT_M = 0.15
 _SPACING_M = 0.1  # of the points of the path in the intention
-
-
-@dataclass(frozen=True)
-class PeerParams:
-    """Parameters of the avoidance of peers, see ``docs/peers.md``.
-
-    Attributes:
-        avoid_peers: Avoid the peers whose poses are known; False restores upstream behaviour.
-        margin_m: Distance that each of two robots keeps its footprint from the bisector
-            between them; hulls stay twice as far apart.
-        timeout_s: Age from which the state of a peer is ignored.
-        yield_when_idle: A robot without a goal leaves the path of a peer, and comes back.
-        roundabouts: Where four robots or more meet, all keep right of a circle.
-        yield_to_strangers: Make room for a tracked obstacle that keeps the robot from its goal.
-        stranger_patience_s: Time without progress until the robot makes room for a stranger; a
-            random time of up to twice as much is added.
-    """
-
-    avoid_peers: bool = True
-    margin_m: float = 0.05
-    timeout_s: float = 0.5
-    yield_when_idle: bool = True
-    roundabouts: bool = True
-    yield_to_strangers: bool = False
-    stranger_patience_s: float = 3.0
 
 
 @dataclass(frozen=True)

@@ -3,13 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
+from quad_nav.parameter import flag, number
 
 Floats = NDArray[np.float64]
+
+
+def max_acceleration() -> Any:
+    """Declare ``max_acceleration``, which tracking and evasion read."""
+    return number(
+        "max_acceleration",
+        0.0,
+        "metres/s^2",
+        0,
+        100,
+        "Greatest acceleration of obstacles, before which the robot rests; 0: it need not.",
+    )
 
 
 @dataclass(frozen=True)
@@ -17,25 +31,35 @@ class TrackerParams:
     """Parameters of the tracking of moving obstacles, see ``docs/moving_obstacles.md``.
 
     Attributes:
-        track_moving_obstacles: Track what moves; False leaves everything to the costmaps.
-        range_m: Farthest range at which obstacles are tracked.
-        min_speed_mps: Slower obstacles count as standing.
-        max_radius_m: Larger obstacles count as standing.
-        acceleration_mps2: Standard deviation of the obstacles' accelerations.
-        lost_after_s: Time for which an obstacle that is hidden is predicted.
-        margin_m: A point moves if it is inside space that was free, by so much.
         max_acceleration_mps2: Greatest acceleration of an obstacle for passive safety; above 0
             what may walk on or in is told as well, see ``Tracks.suspects``.
     """
 
-    track_moving_obstacles: bool = False
-    range_m: float = 10.0
-    min_speed_mps: float = 0.2
-    max_radius_m: float = 1.0
-    acceleration_mps2: float = 1.5
-    lost_after_s: float = 1.5
-    margin_m: float = 0.12
-    max_acceleration_mps2: float = 0.0
+    track_moving_obstacles: bool = flag(
+        "track_moving_obstacles", False, "Track what moves in the scans of LIDARs.", upstream=False
+    )
+    range_m: float = number("range", 10.0, "metres", 0, 100, "Greatest range of tracked obstacles.")
+    min_speed_mps: float = number(
+        "min_speed", 0.2, "metres/s", 0, 5, "Slower obstacles count as standing."
+    )
+    max_radius_m: float = number(
+        "max_radius", 1.0, "metres", 0, 10, "Larger obstacles count as standing."
+    )
+    acceleration_mps2: float = number(
+        "acceleration", 1.5, "metres/s^2", 0, 20, "Deviation of accelerations."
+    )
+    lost_after_s: float = number(
+        "timeout", 1.5, "seconds", 0, 60, "Hidden obstacles are kept so long."
+    )
+    margin_m: float = number(
+        "margin",
+        0.12,
+        "metres",
+        0,
+        1,
+        "A point moves that is so far in free space.",
+    )
+    max_acceleration_mps2: float = max_acceleration()
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 from quad_nav import config
+from quad_nav.config.fixes import GROUPS
 from quad_nav.config.plugins import Plugin, plugin_name
 from quad_nav.errors import GoalOutsideMap, InputError, NoPath
 from quad_nav.geometry import Pose2D, Twist2D
@@ -172,7 +173,7 @@ def test_nothing_of_a_plugin_is_reconfigurable(tree):
         "global_costmap/inflation_layer",
         "local_costmap",
         "local_costmap/inflation_layer",
-        "fixes",
+        *GROUPS,
     ]
 
 

@@ -18,8 +18,11 @@ from quad_nav.loop.inspection import TRACK, Inspection
 from quad_nav.offline import flight as offline
 
 GOALS = [[[1.0, 4.5]], [[8.5, 1.5]]]
-FIXES = {"track_moving_obstacles": True, "reject_implausible_scans": False, "sensor_timeout": 0.2}
-EVERY = {f"fixes/{name}": value for name, value in FIXES.items()}
+EVERY = {
+    "moving_obstacles/track_moving_obstacles": True,
+    "scan_validator/reject_implausible_scans": False,
+    "sensor_timeout": 0.2,
+}
 
 
 def setup_of(config="default", robots=2):
@@ -30,7 +33,7 @@ def setup_of(config="default", robots=2):
 
 
 def assert_follows(robot):
-    """Every part of a robot has the values of ``FIXES``."""
+    """Every part of a robot has the values of ``EVERY``."""
     assert robot.tracker.params.track_moving_obstacles
     assert robot.navigator.params.sensor_timeout_s == 0.2
     for intake in robot.intakes:
@@ -53,8 +56,8 @@ def test_every_part_follows_python():
 
 def test_no_part_follows_a_refused_change():
     with quad_nav.Flight(setup_of()) as flight:
-        with pytest.raises(InputError, match="fixes/sensor_timeout"):
-            flight.reconfigure(0, {**EVERY, "fixes/sensor_timeout": "soon"})
+        with pytest.raises(InputError, match="sensor_timeout"):
+            flight.reconfigure(0, {**EVERY, "sensor_timeout": "soon"})
         robot = flight._loop.offline_robots[0]
         assert not robot.tracker.params.track_moving_obstacles
         assert robot.intakes[0].is_late(0.0, 100.0)
@@ -72,7 +75,10 @@ def test_every_part_follows_in_each_process(processes):
     flight = offline.Flight(setup_of(), processes=processes)
     try:
         for robot in (0, 1):
-            configuration = updated(flight.robots[robot].configuration, "fixes", FIXES)
+            configuration = flight.robots[robot].configuration
+            for path, value in EVERY.items():
+                namespace, _, name = path.rpartition("/")
+                configuration = updated(configuration, namespace, {name: value})
             flight.reconfigure(robot, configuration)
         for robot in flight.offline_robots.values():
             assert_follows(robot)
@@ -99,7 +105,7 @@ def test_the_validator_follows_a_longer_time_out():
         lidar = Pose3D(1.0, 1.0, 0.3)
         poses = [SensorPose(lidar, lidar)] * len(intake.sinks)
         assert "expected less than 1.00 s" in intake.add_scan(scan, poses, 1.5, 1.5)
-        flight.reconfigure(0, {"fixes/sensor_timeout": 2.0})
+        flight.reconfigure(0, {"sensor_timeout": 2.0})
         assert intake.add_scan(scan, poses, 1.5, 1.5) == ""
 
 

@@ -108,15 +108,18 @@ class FakeRecovery:
         return Step(command=Twist2D(vyaw_radps=1.0), done=self.left == 0)
 
 
+ALONE = {"peers": {"avoid_peers": False}}
+
+
 class Flight:
     """A navigator, its fakes, and a clock that stops wherever something is due.
 
-    It behaves as upstream, or with the group ``fixes`` that is given.
+    It behaves as upstream, or with the parameters of the tree that is given.
     """
 
-    def __init__(self, recoveries=(), fixes=None, **params):
+    def __init__(self, recoveries=(), tree=UPSTREAM, **params):
         params.setdefault("controller_frequency_hz", 10.0)
-        configuration = load({"fixes": UPSTREAM if fixes is None else fixes})
+        configuration = load(tree)
         self.global_costmap = FakeCostmap(5.0)
         self.local_costmap = FakeCostmap(4.0)
         self.planner, self.controller = FakePlanner(), FakeController()
@@ -152,7 +155,7 @@ def test_costmaps_are_updated_at_their_own_frequencies():
 
 
 def test_a_goal_is_planned_once_and_commanded_in_every_cycle():
-    flight = Flight(fixes={}, controller_frequency_hz=2.0)
+    flight = Flight(tree={}, controller_frequency_hz=2.0)
     flight.navigator.set_goal(GOAL, 0.0)
     ticks = flight.until(2.0)
     assert flight.planner.calls == 1
@@ -226,7 +229,7 @@ def test_oscillation_timeout_aborts_when_the_robot_stays_within_its_distance():
 
 
 def test_a_robot_without_progress_replans_then_recovers_then_aborts():
-    flight = Flight([NamedRecovery("r", FakeRecovery())], {"progress_timeout": 2.0})
+    flight = Flight([NamedRecovery("r", FakeRecovery())], {"progress": {"timeout": 2.0}})
     flight.navigator.set_goal(GOAL, 0.0)
     ticks = flight.until(12.0)
     warnings = [warning for tick in ticks for warning in tick.warnings]
@@ -236,7 +239,7 @@ def test_a_robot_without_progress_replans_then_recovers_then_aborts():
 
 
 def test_a_robot_without_progress_relaxes_the_obstacle_weight_until_it_has_moved():
-    flight = Flight(fixes={"progress_timeout": 2.0})
+    flight = Flight(tree={"progress": {"timeout": 2.0}})
     weights = flight.controller
     weights.params = Weights(occdist_scale=0.01)
     flight.navigator.set_goal(GOAL, 0.0)
@@ -302,10 +305,10 @@ def test_a_sensor_timeout_stops_the_robot_and_names_the_sensor():
     assert FORWARD in {tick.command for tick in flight.until(2.0)}
 
 
-@pytest.mark.parametrize("fixes, turns", [({"avoid_peers": False}, False), (UPSTREAM, True)])
-def test_a_rotation_pauses_without_sensor_data(fixes, turns):
+@pytest.mark.parametrize("tree, turns", [(ALONE, False), (UPSTREAM, True)])
+def test_a_rotation_pauses_without_sensor_data(tree, turns):
     recovery = FakeRecovery(steps=200)
-    flight = Flight([NamedRecovery("rotate", recovery)], fixes, planner_patience_s=0.5)
+    flight = Flight([NamedRecovery("rotate", recovery)], tree, planner_patience_s=0.5)
     flight.planner.fails = True
     flight.navigator.set_goal(GOAL, 0.0)
     flight.until(2.0)
@@ -318,7 +321,7 @@ def test_a_rotation_pauses_without_sensor_data(fixes, turns):
 
 
 def test_a_robot_that_stops_without_sensor_data_keeps_its_patience():
-    flight = Flight(fixes={"progress_timeout": 1.0, "avoid_peers": False})
+    flight = Flight(tree={"progress": {"timeout": 1.0}, **ALONE})
     flight.navigator.set_goal(GOAL, 0.0)
     flight.local_costmap.stale = [("obstacle_layer/base_scan", 1.26)]
     flight.until(5.0)

@@ -26,7 +26,7 @@ from quad_nav.tracking.tracks import Tracks
 
 ROOT = Path(__file__).resolve().parents[3]
 FEW_BEAMS = LidarParams(step_size_rad=2 * np.pi / 128)
-EVADES = {"track_moving_obstacles": True, "avoid_moving_obstacles": True}
+EVADES = {"moving_obstacles": {"track_moving_obstacles": True, "avoid_moving_obstacles": True}}
 BOTH = RobotPoses(HERE, HERE)
 
 # -- the state machine ----------------------------------------------------------------
@@ -35,9 +35,9 @@ BOTH = RobotPoses(HERE, HERE)
 class Threatened(Flight):
     """A robot at (1, 1), one obstacle that comes from (3, 1.1) at 1 m/s, and a peer at (1.9, 1)."""
 
-    def __init__(self, fixes=(), **params):
+    def __init__(self, tree=EVADES, **params):
         rotate = NamedRecovery("rotate", FakeRecovery(steps=1000))
-        super().__init__([rotate], {**EVADES, **dict(fixes)}, planner_patience_s=0.5, **params)
+        super().__init__([rotate], tree, planner_patience_s=0.5, **params)
         self.controller.params = TrajectoryPlannerParams(holonomic_robot=True, max_vel_x_mps=0.5)
         self.threat = True
 

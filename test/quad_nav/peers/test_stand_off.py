@@ -141,7 +141,7 @@ def test_the_switch_is_off_by_default() -> None:
     peers = build_navigator(load({**TREE, "robot": 0})).peers
     assert not peers.params.yield_to_strangers
     on = build_navigator(
-        load({**TREE, "robot": 0, "fixes": {"yield_to_strangers": True, "stranger_patience": 2.5}})
+        load({**TREE, "robot": 0, "peers": {"yield_to_strangers": True, "stranger_patience": 2.5}})
     ).peers
     assert on.params.yield_to_strangers
     assert math.isclose(on.params.stranger_patience_s, 2.5)
