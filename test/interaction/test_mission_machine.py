@@ -296,4 +296,4 @@ class MissionMachine(RuleBasedStateMachine):
 
 
 TestMissionMachine = MissionMachine.TestCase
-TestMissionMachine.settings = machine_settings(few=100, share=0.5)
+TestMissionMachine.settings = machine_settings(few=100, share=0.8)
