@@ -1,118 +1,134 @@
-"""Folders of compiled kernels; damaged, foreign and full caches."""
+"""Folders of compiled kernels, and when they are compiled anew."""
 
 from __future__ import annotations
 
-import errno
+import importlib.util
 import os
-import pickle
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
-from numba.core import caching
 
 from quad_nav.cli.options import show_warnings
-from quad_nav.files import cache_folder
+from quad_nav.files import cache_folder, kernel_cache
 from quad_nav.files.cache_folder import user_cache_folder
-from quad_nav.kernels import jit, library
-from quad_nav.kernels.numba_cache import compile_with_numba
+
+CALLER = """
+from quad_nav.files.kernel_cache import njit
+from quad_nav.callee import FACTOR, increased
 
 
-def doubled(x):
-    return 2 * x
+@njit(cache=True, nogil=True)
+def kernel(x):
+    return increased(FACTOR * x)
+"""
+CALLEE = """
+from quad_nav.files.kernel_cache import njit
+
+FACTOR = {factor}
+
+
+@njit(cache=True, nogil=True)
+def increased(x):
+    return x + {more}
+"""
 
 
 @pytest.fixture
-def cache(tmp_path, monkeypatch) -> Path:
-    monkeypatch.setattr(library, "FOLDER", tmp_path)
-    return tmp_path
+def package(tmp_path, monkeypatch) -> Path:
+    """Sources in a folder of their own: a kernel that calls one of another module."""
+    sources = tmp_path / "src" / "quad_nav"
+    sources.mkdir(parents=True)
+    (sources / "caller.py").write_text(CALLER)
+    (sources / "callee.py").write_text(CALLEE.format(factor=2, more=1))
+    monkeypatch.setattr(kernel_cache, "SOURCES", tmp_path / "src")
+    monkeypatch.setattr(kernel_cache, "FOLDER", tmp_path / "cache")
+    return sources
 
 
-def kernel():
-    return compile_with_numba(doubled, True, {"nogil": True})
+@pytest.fixture(autouse=True)
+def new_process():
+    """Forget the sources of earlier tests."""
+    kernel_cache._content.cache_clear()
+    kernel_cache._imported.cache_clear()
+    yield
+    kernel_cache._content.cache_clear()
+    kernel_cache._imported.cache_clear()
 
 
-def cached() -> bool:
-    """Call the kernel; true if its result came from the cache."""
-    one = kernel()
-    assert one(21) == 42
-    return sum(one.stats.cache_hits.values()) == 1
+def load(path: Path, monkeypatch):
+    name = f"quad_nav.{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, name, module)
+    spec.loader.exec_module(module)
+    return module
 
 
-def test_kernels_are_cached(cache):
-    assert [cached(), cached()] == [False, True]
+def call(package: Path, monkeypatch):
+    """Load both modules; return what the kernel returns for 20, and whether it was cached."""
+    kernel_cache._content.cache_clear()
+    kernel_cache._imported.cache_clear()
+    load(package / "callee.py", monkeypatch)
+    kernel = load(package / "caller.py", monkeypatch).kernel
+    return kernel(20), sum(kernel.stats.cache_hits.values()) == 1
 
 
-def test_kernels_are_compiled_anew_when_any_kernel_changes(cache, monkeypatch):
-    """numba's own stamp covers the module of the kernel, not those that the kernel calls."""
-    assert not cached()
-    monkeypatch.setattr(library, "DIGEST", "another")
-    assert [cached(), cached()] == [False, True]
+def test_kernels_are_cached(package, monkeypatch):
+    assert [call(package, monkeypatch), call(package, monkeypatch)] == [(41, False), (41, True)]
 
 
-def test_digest_covers_every_kernel(tmp_path, monkeypatch):
-    sources = tmp_path / "kernels"
-    sources.mkdir()
-    (sources.parent / "grid.py").write_text("FREE = 0")
-    for name in ("a.py", "b.py"):
-        (sources / name).write_text("")
-    monkeypatch.setattr(library, "SOURCES", sources)
-    digests = {library.find_digest()}
-    for path in (sources / "a.py", sources / "b.py", sources.parent / "grid.py"):
-        path.write_text("CHANGED = 1")
-        digests.add(library.find_digest())
-    assert len(digests) == 4
+@pytest.mark.parametrize("factor, more, result", [(2, 5, 45), (3, 1, 61)])
+def test_a_kernel_is_compiled_anew_when_another_module_changes(
+    package, monkeypatch, factor, more, result
+):
+    """The kernel that it calls, and a constant that it reads, are in its machine code."""
+    call(package, monkeypatch)
+    (package / "callee.py").write_text(CALLEE.format(factor=factor, more=more))
+    assert call(package, monkeypatch) == (result, False)
+    assert call(package, monkeypatch) == (result, True)
 
 
-class Gone:
-    """A type of an earlier version."""
+def test_a_kernel_stays_cached_when_a_module_changes_that_it_does_not_import(package, monkeypatch):
+    call(package, monkeypatch)
+    (package / "other.py").write_text("")
+    callee = kernel_cache.folder_name(package / "callee.py")
+    (package / "caller.py").write_text(CALLER + "# changed")
+    assert call(package, monkeypatch) == (41, False)
+    assert kernel_cache.folder_name(package / "callee.py") == callee
 
 
-@pytest.mark.parametrize("damage", ["garbage", "missing type", "truncated", "data"])
-def test_damaged_cache_is_replaced(cache, damage):
-    assert not cached()
-    (index,), (data,) = cache.glob("*.nbi"), cache.glob("*.nbc")
-    version = pickle.dumps(caching.numba.__version__)
-    if damage == "garbage":
-        index.write_bytes(b"\x00garbage")
-    elif damage == "missing type":
-        entry = pickle.dumps(("stamp", {Gone: "x"}))
-        index.write_bytes(version + entry.replace(b"Gone", b"G0ne"))
-    elif damage == "truncated":
-        index.write_bytes(index.read_bytes()[:-9])
-    else:
-        data.write_bytes(b"")
-    assert [cached(), cached()] == [False, True]
+def test_a_link_to_the_sources_has_the_same_cache(package, monkeypatch):
+    """As catkin's development space has."""
+    (package.parents[1] / "link").symlink_to(package)
+    assert call(package, monkeypatch) == (41, False)
+    assert call(package.parents[1] / "link", monkeypatch) == (41, True)
 
 
-def test_full_disk_does_not_end_a_flight(cache, monkeypatch):
-    def full(*_):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    with monkeypatch.context() as context:
-        context.setattr(caching.IndexDataCacheFile, "_open_for_write", full)
-        assert not cached()
-        for index in cache.glob("doubled*.nbi"):
-            index.write_bytes(b"")
-        assert not cached()
-    assert [cached(), cached()] == [False, True]
+def test_a_kernel_runs_as_python():
+    """With NUMBA_DISABLE_JIT."""
+    code = "from quad_nav.kernels.cost_grid import cell_of; print(type(cell_of))"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_DISABLE_JIT": "1"}
+    run = subprocess.run([sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE)
+    assert run.stdout.split() == [b"<class", b"'function'>"]
 
 
-def test_without_a_folder_kernels_run_and_the_cost_is_told(monkeypatch, capsys):
-    monkeypatch.setattr(library, "FOLDER", None)
-    monkeypatch.setattr(jit, "_LIBRARY", None)
+def test_without_a_folder_kernels_run_and_the_cost_is_told(package, monkeypatch, capsys):
+    monkeypatch.setattr(kernel_cache, "FOLDER", None)
     monkeypatch.setattr(
-        library, "PROBLEMS", ["/a: Permission denied", "/b: is open to other users"]
+        kernel_cache, "PROBLEMS", ["/a: Permission denied", "/b: is open to other users"]
     )
-    assert [cached(), cached()] == [False, False]
+    assert [call(package, monkeypatch), call(package, monkeypatch)] == [(41, False), (41, False)]
     show_warnings(["robot0: odd"])
     first, second = capsys.readouterr().err.splitlines()
     assert first == "robot0: odd"
-    assert "/a: Permission denied; /b: is open" in second and "takes about 30 s" in second
+    assert "/a: Permission denied; /b: is open" in second and "takes about 60 s" in second
 
 
-def test_nothing_is_told_with_a_cache(cache):
-    assert jit.cache_warnings() == []
+def test_nothing_is_told_with_a_cache(package):
+    assert kernel_cache.cache_warnings() == []
 
 
 @pytest.fixture
@@ -131,21 +147,21 @@ def temporary(places) -> Path:
 
 
 def test_sources_come_first(tmp_path, monkeypatch):
-    monkeypatch.setattr(library, "SOURCES", tmp_path)
+    monkeypatch.setattr(kernel_cache, "_PACKAGE", tmp_path)
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    assert library.find_cache_folder() == (tmp_path / "__pycache__", [])
+    assert kernel_cache.find_cache_folder() == (tmp_path / "__pycache__" / "kernels", [])
 
 
 def test_folder_of_numba_is_used(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "given"))
-    assert library.find_cache_folder() == (tmp_path / "given", [])
+    assert kernel_cache.find_cache_folder() == (tmp_path / "given", [])
 
 
 def test_read_only_sources_and_no_home_use_the_temporary_folder(places, monkeypatch):
     (places / "sources").write_text("a file: no folder can be made in it, even by root")
-    monkeypatch.setattr(library, "SOURCES", places / "sources")
+    monkeypatch.setattr(kernel_cache, "_PACKAGE", places / "sources")
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    folder, problems = library.find_cache_folder()
+    folder, problems = kernel_cache.find_cache_folder()
     assert folder.parent == temporary(places)
     assert stat.S_IMODE(folder.parent.stat().st_mode) == 0o700
     assert len(problems) == 2 and "Not a directory" in problems[0]

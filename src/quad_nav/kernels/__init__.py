@@ -4,8 +4,7 @@ Kernels take arrays, numbers and named tuples, never objects with behaviour. The
 holds the maths and the reasons, the kernel's module the loops. Every kernel also runs as plain
 Python, with ``NUMBA_DISABLE_JIT=1``.
 
-Reading order: ``jit``, ``library`` and ``build_library`` (compiled kernels without numba),
-``numba_cache``; ``cost_grid`` (cells and costmaps);
+Reading order: ``cost_grid`` (cells and costmaps);
 ``projection``, ``observations``, ``raytrace`` with ``obstructed_cells``, ``voxels``, ``inflation``
 (``costmap``);
 ``wave``, ``descent``, ``global_planner`` (``plan``); ``collision``, ``map_grid``, ``rollout``,

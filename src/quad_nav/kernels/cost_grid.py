@@ -10,8 +10,8 @@ from typing import Any, NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.grid import UNKNOWN
-from quad_nav.kernels.jit import njit
 
 
 class CostmapView(NamedTuple):

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.jit import njit
+from quad_nav.files.kernel_cache import njit
 from quad_nav.kernels.wave import NOT_REACHED
 
 OBSTACLE = 254  # NavFn never enters cells of this cost

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.kernels.collision import Triple, footprint_cost
 from quad_nav.kernels.cost_grid import CostmapView, cell_of
-from quad_nav.kernels.jit import njit
 from quad_nav.kernels.moving_discs import MovingDiscs, passing_cost
 
 _TOLERANCE = 1e-4
@@ -30,7 +30,7 @@ class Motion(NamedTuple):
     sim_time_s: float
     sim_granularity_m: float
     angular_sim_granularity_rad: float
-    acceleration_limits: tuple  # x, y, theta
+    acceleration_limits: Triple  # x, y, theta
     min_vel_trans_mps: float
     max_vel_trans_mps: float
     min_vel_theta_radps: float

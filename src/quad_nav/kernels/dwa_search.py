@@ -12,6 +12,7 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.kernels.collision import Triple
 from quad_nav.kernels.cost_grid import CostmapView
 from quad_nav.kernels.dwa import (
@@ -31,7 +32,6 @@ from quad_nav.kernels.dwa import (
     step_count,
     total_cost,
 )
-from quad_nav.kernels.jit import njit
 from quad_nav.kernels.lanes import (
     LANES,
     LAST,

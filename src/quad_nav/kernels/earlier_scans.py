@@ -11,7 +11,7 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.jit import njit
+from quad_nav.files.kernel_cache import njit
 
 UNKNOWN, OCCUPIED, FREED = 0, 1, 2
 """Evidence about a point: unseen or in doubt, occupied earlier, free space earlier."""

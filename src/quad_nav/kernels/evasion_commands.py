@@ -11,8 +11,8 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.kernels.body_response import Body, move_bodies, rest_s
-from quad_nav.kernels.jit import njit
 from quad_nav.kernels.space_time import (
     FAR,
     SUBSTEPS,

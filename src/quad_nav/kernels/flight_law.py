@@ -13,7 +13,7 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.jit import njit
+from quad_nav.files.kernel_cache import njit
 
 
 class BodyConstants(NamedTuple):

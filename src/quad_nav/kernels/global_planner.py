@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.kernels.descent import leaves_map, step_down, surroundings
-from quad_nav.kernels.jit import njit
 from quad_nav.kernels.wave import NOT_REACHED, arrival_at
 
 

@@ -5,13 +5,13 @@ Mirrors ``costmap/inflation.py``.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.grid import FREE, INSCRIBED, LETHAL, UNKNOWN
-from quad_nav.kernels.jit import njit
 
 _VISITED = -1  # a state below all others
 _LEFT, _LOWER, _RIGHT, _UPPER = 1, 2, 4, 8  # steps that lead away from the seed
@@ -26,9 +26,9 @@ class Ranks(NamedTuple):
     in the table, then the steps that lead away from its seed. States compare as ranks do.
     """
 
-    costs: np.ndarray
+    costs: NDArray[np.uint8]
     """uint8[ranks], cost at each rank"""
-    states: np.ndarray
+    states: NDArray[np.signedinteger[Any]]
     """int32 or int64[radius + 2, radius + 2], the highest state of the rank at (abs(dx), abs(dy))
     cells; of rank ``ranks`` where there is no cost"""
     shift: int

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.jit import njit
+from quad_nav.files.kernel_cache import njit
 
 
 class Keyframes(NamedTuple):
@@ -19,19 +19,19 @@ class Keyframes(NamedTuple):
     The keyframes of motion k are the rows ``first[k]:first[k + 1]``.
     """
 
-    first: np.ndarray
+    first: NDArray[np.int64]
     """int64[m + 1]"""
-    times: np.ndarray
+    times: NDArray[np.float64]
     """float64[n], seconds, increasing within a motion"""
-    poses: np.ndarray
+    poses: NDArray[np.float64]
     """float64[n, 3], x, y in metres and yaw in radians"""
-    tangents: np.ndarray
+    tangents: NDArray[np.float64]
     """float64[n, 3], of the spline at each keyframe, per segment"""
-    splines: np.ndarray
+    splines: NDArray[np.bool_]
     """bool[m], whether a spline leads through the keyframes, or straight lines"""
-    loops: np.ndarray
+    loops: NDArray[np.bool_]
     """bool[m], whether a motion starts again after its last keyframe"""
-    phases: np.ndarray
+    phases: NDArray[np.float64]
     """float64[m], seconds that a motion is ahead of the time"""
 
 

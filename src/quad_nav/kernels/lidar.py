@@ -14,7 +14,7 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.jit import njit
+from quad_nav.files.kernel_cache import njit
 from quad_nav.kernels.rays import Triple, dot, enter_solid, through_slab, triple, turn
 from quad_nav.kernels.sectors import Axes, columns_of, rough_sectors, sector_of
 
@@ -25,13 +25,13 @@ _RING_M, _RINGS = 1.0, 64  # rings around a LIDAR; the last one has no outer lim
 class Solids(NamedTuple):
     """Solids: kinds and sizes as in ``rays``, positions in ``map``, metres."""
 
-    kinds: np.ndarray
+    kinds: NDArray[np.int64]
     """int64[s]"""
-    centres: np.ndarray
+    centres: NDArray[np.float64]
     """float64[s, 3]"""
-    rotations: np.ndarray
+    rotations: NDArray[np.float64]
     """float64[s, 3, 3], the solids' axes in ``map`` as rows"""
-    sizes: np.ndarray
+    sizes: NDArray[np.float64]
     """float64[s, 3]"""
 
 
@@ -43,21 +43,21 @@ class SolidGrid(NamedTuple):
     """
 
     solids: Solids
-    low: np.ndarray
+    low: NDArray[np.float64]
     """float64[3], lower corner of all that the grid holds"""
-    high: np.ndarray
+    high: NDArray[np.float64]
     """float64[3], upper corner"""
     cell_m: float
-    starts: np.ndarray
+    starts: NDArray[np.int32]
     """int32[rows, columns + 1]"""
-    members: np.ndarray
+    members: NDArray[np.int32]
     """int32[k], numbers of solids"""
 
 
 class Beams(NamedTuple):
     """Beams of a LIDAR; beam k is at ``first_rad + k * step_rad`` in its plane."""
 
-    directions: np.ndarray
+    directions: NDArray[np.float64]
     """float64[m, 2], cosines and sines of the beams"""
     first_rad: float
     step_rad: float

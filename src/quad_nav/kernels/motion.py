@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.kernels.collision import Triple
 from quad_nav.kernels.cost_grid import CostmapView
-from quad_nav.kernels.jit import njit
 from quad_nav.kernels.lanes import (
     LANES,
     LAST,

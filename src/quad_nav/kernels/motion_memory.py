@@ -11,7 +11,7 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.jit import njit
+from quad_nav.files.kernel_cache import njit
 
 NONE = -1
 _STILL_S = 0.15  # after the last sample of a track, for which it still counts as known

@@ -11,8 +11,8 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.kernels.cost_grid import CostmapView, cell_index, include
-from quad_nav.kernels.jit import njit
 from quad_nav.kernels.obstructed_cells import sector_of
 
 _STRIDE = 16  # beams

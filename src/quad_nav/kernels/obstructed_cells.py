@@ -12,8 +12,8 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.grid import FREE
-from quad_nav.kernels.jit import njit
 
 SECTORS = 1024
 MAX_OBSTRUCTED = 512  # cells that are worth looking for lines towards them

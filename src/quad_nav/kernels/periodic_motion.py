@@ -13,7 +13,7 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.jit import njit
+from quad_nav.files.kernel_cache import njit
 
 NONE = -1
 _MAX_GAP_S = 1.0  # between two samples of a trail

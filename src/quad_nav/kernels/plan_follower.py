@@ -10,7 +10,7 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.jit import njit
+from quad_nav.files.kernel_cache import njit
 
 
 @njit(cache=True, nogil=True)

@@ -11,9 +11,9 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.grid import FREE, LETHAL
 from quad_nav.kernels.cost_grid import CostmapView, cell_index, cell_of
-from quad_nav.kernels.jit import njit
 from quad_nav.kernels.observations import ObservationStack, clip_to_grid, include_rays
 from quad_nav.kernels.obstructed_cells import (
     MAX_OBSTRUCTED,

@@ -11,8 +11,8 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.kernels.flight_law import BodyConstants, FlightGains, fly, rotation_from_quaternion
-from quad_nav.kernels.jit import njit
 
 NO_INDEX = -1
 MOVING = -2

@@ -13,10 +13,10 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.grid import INSCRIBED
 from quad_nav.kernels.collision import COLLIDES, Triple, footprint_cost, line_cost
 from quad_nav.kernels.cost_grid import CostmapView, cell_of
-from quad_nav.kernels.jit import njit
 from quad_nav.kernels.lanes import OFF_MAP, UNCERTAIN
 from quad_nav.kernels.motion import (
     RolloutParams,

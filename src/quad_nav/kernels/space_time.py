@@ -13,7 +13,7 @@ from typing import List, NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.jit import njit
+from quad_nav.files.kernel_cache import njit
 
 SUBSTEPS = 5
 """Predictions in each step."""

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.grid import INSCRIBED, LETHAL
-from quad_nav.kernels.jit import njit
 
 MARGIN_M = 0.05
 """Gap within which standing obstacles cost."""

@@ -11,7 +11,7 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.jit import njit
+from quad_nav.files.kernel_cache import njit
 from quad_nav.kernels.periodic_motion import NONE, Trails
 
 

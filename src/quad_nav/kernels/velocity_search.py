@@ -11,9 +11,9 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.kernels.collision import Triple
 from quad_nav.kernels.cost_grid import cell_of
-from quad_nav.kernels.jit import njit
 from quad_nav.kernels.motion import RolloutParams, longest
 from quad_nav.kernels.rollout import (
     RolloutInputs,

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.grid import LETHAL
-from quad_nav.kernels.jit import njit
 
 NOT_REACHED: np.float32 = np.float32(1e10)
 BUCKET_SIZE = 10000  # cells that one bucket holds; further ones are dropped

@@ -31,8 +31,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from quad_nav.config import Parameter
 from quad_nav.errors import InputError, printable
+from quad_nav.files.kernel_cache import cache_warnings
 from quad_nav.files.values import is_number
-from quad_nav.kernels.jit import cache_warnings
 from quad_nav.loop.flight_loop import STEPS_PER_ODOMETRY
 from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.readiness import server_parameters, start_node
