@@ -109,7 +109,7 @@ def test_a_link_to_the_sources_has_the_same_cache(package, monkeypatch):
 
 def test_a_kernel_runs_as_python():
     """With NUMBA_DISABLE_JIT."""
-    code = "from quad_nav.kernels.cost_grid import cell_of; print(type(cell_of))"
+    code = "from quad_nav.costmap.cost_grid_kernel import cell_of; print(type(cell_of))"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_DISABLE_JIT": "1"}
     run = subprocess.run([sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE)
     assert run.stdout.split() == [b"<class", b"'function'>"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from quad_nav.kernels.motion_memory import NONE, replay
 from quad_nav.tracking.motion_memory import MotionMemory
+from quad_nav.tracking.motion_memory_kernel import NONE, replay
 from quad_nav.tracking.tracks import Tracks
 
 TIMES = np.arange(0.0, 6.05, 0.1)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from quad_nav.control.prediction import predict
-from quad_nav.kernels.period_votes import (
+from quad_nav.tracking.motion_memory import MotionMemory
+from quad_nav.tracking.period_votes import (
     NEAR,
     ODD,
     ONE_TURN,
@@ -17,7 +18,8 @@ from quad_nav.kernels.period_votes import (
     first_turns,
     sums_of_turns,
 )
-from quad_nav.kernels.periodic_motion import (
+from quad_nav.tracking.periodic_motion import PeriodicMotion, multiples
+from quad_nav.tracking.periodic_motion_kernel import (
     NONE,
     Trails,
     drop_repeats,
@@ -25,10 +27,8 @@ from quad_nav.kernels.periodic_motion import (
     forget_after,
     replay_all,
 )
-from quad_nav.kernels.trail_links import continued_trails, link
-from quad_nav.tracking.motion_memory import MotionMemory
-from quad_nav.tracking.periodic_motion import PeriodicMotion, multiples
 from quad_nav.tracking.tracks import Tracks
+from quad_nav.tracking.trail_links import continued_trails, link
 
 PERIOD_S, RADIUS_M = 20.0, 3.0
 AHEAD_S = np.arange(0.0, 6.05, 0.5)

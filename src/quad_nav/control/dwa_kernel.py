@@ -14,10 +14,10 @@ from typing import Any, NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control.moving_discs import MovingDiscs, passing_cost
+from quad_nav.costmap.collision import Triple, footprint_cost
+from quad_nav.costmap.cost_grid_kernel import CostmapView, cell_of
 from quad_nav.files.kernel_cache import njit
-from quad_nav.kernels.collision import Triple, footprint_cost
-from quad_nav.kernels.cost_grid import CostmapView, cell_of
-from quad_nav.kernels.moving_discs import MovingDiscs, passing_cost
 
 _TOLERANCE = 1e-4
 # Columns of the distances

@@ -12,10 +12,7 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.files.kernel_cache import njit
-from quad_nav.kernels.collision import Triple
-from quad_nav.kernels.cost_grid import CostmapView
-from quad_nav.kernels.dwa import (
+from quad_nav.control.dwa_kernel import (
     ALIGNMENT,
     GOAL,
     GOAL_FRONT,
@@ -32,7 +29,7 @@ from quad_nav.kernels.dwa import (
     step_count,
     total_cost,
 )
-from quad_nav.kernels.lanes import (
+from quad_nav.control.lanes import (
     LANES,
     LAST,
     OFF_MAP,
@@ -45,6 +42,9 @@ from quad_nav.kernels.lanes import (
     fill_lane,
     travel_lanes,
 )
+from quad_nav.costmap.collision import Triple
+from quad_nav.costmap.cost_grid_kernel import CostmapView
+from quad_nav.files.kernel_cache import njit
 
 TERMS = 5  # parts of the cost beside the obstacles': goal_front, alignment, path, goal, twirling
 _ROUNDING = 1e-7  # of single precision, with room

@@ -11,9 +11,8 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.files.kernel_cache import njit
-from quad_nav.kernels.body_response import Body, move_bodies, rest_s
-from quad_nav.kernels.space_time import (
+from quad_nav.control.body_response import Body, move_bodies, rest_s
+from quad_nav.control.space_time import (
     FAR,
     SUBSTEPS,
     SpaceTime,
@@ -21,7 +20,8 @@ from quad_nav.kernels.space_time import (
     haste_per_s,
     threat,
 )
-from quad_nav.kernels.standing_obstacles import StandingObstacles, overlap_cost
+from quad_nav.control.standing_obstacles import StandingObstacles, overlap_cost
+from quad_nav.files.kernel_cache import njit
 
 BOTH_S = 1.0
 """Duration of the first and the second command together."""

@@ -11,10 +11,10 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.costmap.collision import mark_footprint
+from quad_nav.costmap.cost_grid_kernel import CostmapView, cell_of
 from quad_nav.files.kernel_cache import njit
 from quad_nav.grid import INSCRIBED, UNKNOWN
-from quad_nav.kernels.collision import mark_footprint
-from quad_nav.kernels.cost_grid import CostmapView, cell_of
 
 
 @njit(cache=True, nogil=True)

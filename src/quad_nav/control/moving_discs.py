@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.costmap.collision import COLLIDES
 from quad_nav.files.kernel_cache import njit
 from quad_nav.grid import INSCRIBED
-from quad_nav.kernels.collision import COLLIDES
 
 _CERTAIN_M = 0.3  # standard deviation up to which a predicted collision makes a rollout illegal
 _FAR = 3.0  # standard deviations at which the costs end

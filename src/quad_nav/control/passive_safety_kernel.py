@@ -11,9 +11,9 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control.body_response import Body, move_bodies
+from quad_nav.control.standing_obstacles import StandingObstacles, gap_at
 from quad_nav.files.kernel_cache import njit
-from quad_nav.kernels.body_response import Body, move_bodies
-from quad_nav.kernels.standing_obstacles import StandingObstacles, gap_at
 
 AT_REST_MPS = 0.03
 """Speed below which a robot rests."""

@@ -17,10 +17,10 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control.moving_discs import MovingDiscs
 from quad_nav.geometry import Pose2D
-from quad_nav.kernels.moving_discs import MovingDiscs
-from quad_nav.kernels.periodic_motion import follow_replays, forget_after
 from quad_nav.tracking.motion_memory import SEEN_M, MotionMemory
+from quad_nav.tracking.periodic_motion_kernel import follow_replays, forget_after
 from quad_nav.tracking.tracks import Tracks
 
 Floats = NDArray[np.float64]

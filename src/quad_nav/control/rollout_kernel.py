@@ -1,8 +1,8 @@
 """Trajectory rollout: simulate velocity samples and score them.
 
-``control/rollout.py`` has the maths, ``motion`` the poses. Poses and velocities of the robot are
-triples: x, y in metres and yaw in the costmap's frame; vx, vy in m/s and vtheta in rad/s in the
-robot's frame.
+``control/rollout.py`` has the maths, ``sample_motion`` the poses. Poses and velocities of the robot
+are triples: x, y in metres and yaw in the costmap's frame; vx, vy in m/s and vtheta in rad/s in
+the robot's frame.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.files.kernel_cache import njit
-from quad_nav.grid import INSCRIBED
-from quad_nav.kernels.collision import COLLIDES, Triple, footprint_cost, line_cost
-from quad_nav.kernels.cost_grid import CostmapView, cell_of
-from quad_nav.kernels.lanes import OFF_MAP, UNCERTAIN
-from quad_nav.kernels.motion import (
+from quad_nav.control.lanes import OFF_MAP, UNCERTAIN
+from quad_nav.control.moving_discs import MovingDiscs, passing_cost
+from quad_nav.control.sample_motion import (
     RolloutParams,
     last_cells,
     longest,
     step_count,
     travel,
 )
-from quad_nav.kernels.moving_discs import MovingDiscs, passing_cost
+from quad_nav.costmap.collision import COLLIDES, Triple, footprint_cost, line_cost
+from quad_nav.costmap.cost_grid_kernel import CostmapView, cell_of
+from quad_nav.files.kernel_cache import njit
+from quad_nav.grid import INSCRIBED
 
 OUT_OF_REACH = -2.0  # the cost of a trajectory that leaves the reach of path or goal
 _NO_LINE_OF_SIGHT = 1.7976931348623157e308

@@ -12,10 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.files.kernel_cache import njit
-from quad_nav.kernels.collision import Triple
-from quad_nav.kernels.cost_grid import CostmapView
-from quad_nav.kernels.lanes import (
+from quad_nav.control.lanes import (
     LANES,
     LAST,
     ROWS,
@@ -28,6 +25,9 @@ from quad_nav.kernels.lanes import (
     fill_lane,
     travel_lanes,
 )
+from quad_nav.costmap.collision import Triple
+from quad_nav.costmap.cost_grid_kernel import CostmapView
+from quad_nav.files.kernel_cache import njit
 
 _ROUNDING = 1e-15  # of a double, with room
 

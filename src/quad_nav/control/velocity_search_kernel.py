@@ -11,17 +11,17 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.files.kernel_cache import njit
-from quad_nav.kernels.collision import Triple
-from quad_nav.kernels.cost_grid import cell_of
-from quad_nav.kernels.motion import RolloutParams, longest
-from quad_nav.kernels.rollout import (
+from quad_nav.control.rollout_kernel import (
     RolloutInputs,
     cheapest,
     cost_up_to,
     least_costs,
     occupancy_at,
 )
+from quad_nav.control.sample_motion import RolloutParams, longest
+from quad_nav.costmap.collision import Triple
+from quad_nav.costmap.cost_grid_kernel import cell_of
+from quad_nav.files.kernel_cache import njit
 
 NO_SAMPLE = -1.0
 

@@ -8,9 +8,9 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.costmap.cost_grid_kernel import CostmapView, cell_of, fill_convex_polygon
 from quad_nav.files.kernel_cache import njit
 from quad_nav.grid import INSCRIBED, LETHAL, UNKNOWN
-from quad_nav.kernels.cost_grid import CostmapView, cell_of, fill_convex_polygon
 
 Triple = Tuple[float, float, float]
 

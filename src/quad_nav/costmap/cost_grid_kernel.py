@@ -1,10 +1,11 @@
-"""Grids of costs: cells of points, polygons, and one grid merged into another.
+"""Grids of costs: cells of points, polygons and discs, the nearest free cell, merged grids.
 
 Mirrors ``costmap/cost_grid.py``.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple, Tuple
 
 import numpy as np
@@ -209,3 +210,83 @@ def raise_to(below: NDArray[np.uint8], above: NDArray[np.uint8]) -> None:
 @njit(cache=True, nogil=True)
 def _is_raised(cost: np.uint8, other: np.uint8) -> bool:
     return (cost == UNKNOWN) | ((other != UNKNOWN) & (other > cost))
+
+
+@njit(cache=True, nogil=True)
+def raise_discs(
+    cells: NDArray[np.uint8],
+    origin_x_m: float,
+    origin_y_m: float,
+    resolution_m: float,
+    centres: NDArray[np.float64],
+    radius_m: float,
+    value: int,
+) -> None:
+    """Raise the cells whose centres lie in discs; cells that are higher stay.
+
+    Args:
+        cells: uint8[H, W], changed in place.
+        origin_x_m: Corner of cell (0, 0) in the grid's frame.
+        origin_y_m: Corner of cell (0, 0) in the grid's frame.
+        resolution_m: Size of a cell.
+        centres: float64[n, 2], metres in the grid's frame.
+        radius_m: Radius of the discs.
+        value: What the cells are raised to.
+    """
+    size_y, size_x = cells.shape
+    firsts, ends = np.zeros(size_y, np.int64), np.zeros(size_y, np.int64)  # raised in each row
+    for k in range(centres.shape[0]):
+        x = (centres[k, 0] - origin_x_m) / resolution_m - 0.5
+        y = (centres[k, 1] - origin_y_m) / resolution_m - 0.5
+        reach = radius_m / resolution_m
+        for row in range(max(0, math.ceil(y - reach)), min(size_y - 1, math.floor(y + reach)) + 1):
+            half = math.sqrt(max(reach * reach - (row - y) * (row - y), 0.0))
+            begin = max(0, math.ceil(x - half))
+            end = min(size_x - 1, math.floor(x + half)) + 1
+            for column in range(begin, min(end, firsts[row])):
+                cells[row, column] = max(cells[row, column], np.uint8(value))
+            for column in range(max(begin, ends[row]), end):
+                cells[row, column] = max(cells[row, column], np.uint8(value))
+            if begin <= ends[row] and firsts[row] <= end:  # the discs of a path overlap
+                begin, end = min(begin, firsts[row]), max(end, ends[row])
+            firsts[row], ends[row] = begin, end
+
+
+@njit(cache=True, nogil=True)
+def nearest_cell(
+    blocked: NDArray[np.uint8], unwanted: NDArray[np.uint8], start_x: int, start_y: int
+) -> Tuple[int, int]:
+    """Find the nearest cell, in steps to four neighbours, that is neither blocked nor unwanted.
+
+    Args:
+        blocked: uint8[H, W], not 0 for cells that cannot be entered; the start may be one.
+        unwanted: uint8[H, W], not 0 for cells that can be crossed and are no result.
+        start_x: Column of the start.
+        start_y: Row of the start.
+
+    Returns:
+        The cell (x, y), or (-1, -1) if there is none.
+    """
+    size_y, size_x = blocked.shape
+    seen = np.zeros((size_y, size_x), np.bool_)
+    queue = np.empty((blocked.size, 2), np.int32)
+    queue[0, 0], queue[0, 1] = start_x, start_y
+    seen[start_y, start_x] = True
+    head, tail = 0, 1
+    while head < tail:
+        x, y = queue[head]
+        head += 1
+        if not unwanted[y, x] and not blocked[y, x]:
+            return x, y
+        for dx, dy in ((1, 0), (0, 1), (-1, 0), (0, -1)):
+            to_x, to_y = x + dx, y + dy
+            if (
+                0 <= to_x < size_x
+                and 0 <= to_y < size_y
+                and not seen[to_y, to_x]
+                and not blocked[to_y, to_x]
+            ):
+                seen[to_y, to_x] = True
+                queue[tail, 0], queue[tail, 1] = to_x, to_y
+                tail += 1
+    return -1, -1

@@ -11,9 +11,9 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.costmap.cost_grid_kernel import CostmapView, cell_index, include
+from quad_nav.costmap.obstructed_cells import sector_of
 from quad_nav.files.kernel_cache import njit
-from quad_nav.kernels.cost_grid import CostmapView, cell_index, include
-from quad_nav.kernels.obstructed_cells import sector_of
 
 _STRIDE = 16  # beams
 

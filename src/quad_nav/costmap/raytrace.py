@@ -11,17 +11,17 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.files.kernel_cache import njit
-from quad_nav.grid import FREE, LETHAL
-from quad_nav.kernels.cost_grid import CostmapView, cell_index, cell_of
-from quad_nav.kernels.observations import ObservationStack, clip_to_grid, include_rays
-from quad_nav.kernels.obstructed_cells import (
+from quad_nav.costmap.cost_grid_kernel import CostmapView, cell_index, cell_of
+from quad_nav.costmap.observation_kernel import ObservationStack, clip_to_grid, include_rays
+from quad_nav.costmap.obstructed_cells import (
     MAX_OBSTRUCTED,
     SECTORS,
     find_obstructed,
     find_sectors,
     keep_obstructed,
 )
+from quad_nav.files.kernel_cache import njit
+from quad_nav.grid import FREE, LETHAL
 
 MAX_LINES = 2**16  # that an update remembers: in grids up to 256 x 256 one to each cell
 

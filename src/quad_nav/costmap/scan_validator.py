@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.costmap.observation import SourceParams
+from quad_nav.costmap.projection_kernel import count_returns
 from quad_nav.geometry import Pose3D, Scan, angle_difference
-from quad_nav.kernels.projection import count_returns
 
 _ELSEWHERE_M, _ELSEWHERE_RAD = 0.05, 0.05
 # A larger step of the pose from one scan to the next is a correction of the localisation.

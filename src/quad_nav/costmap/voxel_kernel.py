@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.costmap.collision import Triple
+from quad_nav.costmap.cost_grid_kernel import cell_index, include
 from quad_nav.files.kernel_cache import njit
 from quad_nav.grid import FREE, LETHAL, UNKNOWN
-from quad_nav.kernels.collision import Triple
-from quad_nav.kernels.cost_grid import cell_index, include
 
 
 class VoxelGrid(NamedTuple):

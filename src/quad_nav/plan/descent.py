@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.files.kernel_cache import njit
-from quad_nav.kernels.wave import NOT_REACHED
+from quad_nav.plan.wavefront_kernel import NOT_REACHED
 
 OBSTACLE = 254  # NavFn never enters cells of this cost
 NEUTRAL = 50  # NavFn's cost of a free cell

@@ -1,7 +1,7 @@
 """Global planner: A*, and two descents of a potential.
 
 Grids are flat arrays, cell = y * size_x + x; no cell of the outermost ring may be entered.
-``plan/global_planner.py`` has the maths, ``wave`` the wavefront of Dijkstra's search.
+``plan/global_planner.py`` has the maths, ``wavefront_kernel`` that of Dijkstra's search.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.files.kernel_cache import njit
-from quad_nav.kernels.descent import leaves_map, step_down, surroundings
-from quad_nav.kernels.wave import NOT_REACHED, arrival_at
+from quad_nav.plan.descent import leaves_map, step_down, surroundings
+from quad_nav.plan.wavefront_kernel import NOT_REACHED, arrival_at
 
 
 class Queue(NamedTuple):

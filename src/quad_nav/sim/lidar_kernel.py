@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.files.kernel_cache import njit
-from quad_nav.kernels.rays import Triple, dot, enter_solid, through_slab, triple, turn
-from quad_nav.kernels.sectors import Axes, columns_of, rough_sectors, sector_of
+from quad_nav.sim.rays import Triple, dot, enter_solid, through_slab, triple, turn
+from quad_nav.sim.sectors import Axes, columns_of, rough_sectors, sector_of
 
 _ROUNDING = 1e-6  # of a beam's number
 _RING_M, _RINGS = 1.0, 64  # rings around a LIDAR; the last one has no outer limit

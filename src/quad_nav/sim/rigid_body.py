@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.files.kernel_cache import njit
-from quad_nav.kernels.flight_law import BodyConstants, FlightGains, fly, rotation_from_quaternion
+from quad_nav.sim.flight_law import BodyConstants, FlightGains, fly, rotation_from_quaternion
 
 NO_INDEX = -1
 MOVING = -2

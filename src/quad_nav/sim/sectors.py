@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.files.kernel_cache import njit
-from quad_nav.kernels.rays import BOX, CYLINDER, Triple, dot, enter_box
+from quad_nav.sim.rays import BOX, CYLINDER, Triple, dot, enter_box
 
 Axes = Tuple[Triple, Triple, Triple]  # a LIDAR's x, y and z in ``map``
 

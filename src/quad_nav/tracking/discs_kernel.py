@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.files.kernel_cache import njit
-from quad_nav.kernels.earlier_scans import ScanView
+from quad_nav.tracking.earlier_scans import ScanView
 
 _ITERATIONS = 6
 _FAR = 1.0  # 1/m^2, of a centre that the points do not tell

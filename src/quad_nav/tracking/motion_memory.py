@@ -26,7 +26,7 @@ from typing import Dict, List
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.motion_memory import NONE, recall, replay
+from quad_nav.tracking.motion_memory_kernel import NONE, recall, replay
 from quad_nav.tracking.periodic_motion import PeriodicMotion, Replays
 from quad_nav.tracking.tracks import Tracks
 

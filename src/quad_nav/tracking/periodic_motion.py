@@ -26,7 +26,7 @@ from typing import Dict
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.period_votes import (
+from quad_nav.tracking.period_votes import (
     NEAR,
     ODD,
     ONE_TURN,
@@ -36,8 +36,8 @@ from quad_nav.kernels.period_votes import (
     sums_of_turns,
     vote,
 )
-from quad_nav.kernels.periodic_motion import NONE, Trails, drop_repeats, replay_all
-from quad_nav.kernels.trail_links import continued_trails, link
+from quad_nav.tracking.periodic_motion_kernel import NONE, Trails, drop_repeats, replay_all
+from quad_nav.tracking.trail_links import continued_trails, link
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.files.kernel_cache import njit
-from quad_nav.kernels.periodic_motion import NONE, Trails
+from quad_nav.tracking.periodic_motion_kernel import NONE, Trails
 
 
 @njit(cache=True, nogil=True)
