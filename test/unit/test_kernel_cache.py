@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from test_imports import imported_names, package_of
 
 from quad_nav.cli.options import show_warnings
 from quad_nav.files import cache_folder, kernel_cache
@@ -129,6 +130,27 @@ def test_without_a_folder_kernels_run_and_the_cost_is_told(package, monkeypatch,
 
 def test_nothing_is_told_with_a_cache(package):
     assert kernel_cache.cache_warnings() == []
+
+
+def modules_with_kernels():
+    return [
+        path
+        for path in (kernel_cache.SOURCES / "quad_nav").rglob("*.py")
+        if "import njit" in path.read_text()
+    ]
+
+
+@pytest.mark.parametrize("path", modules_with_kernels(), ids=lambda path: path.stem)
+def test_sources_of_a_kernel_are_all_modules_of_ours_that_it_imports(path):
+    names = imported_names(path.read_text(), package_of(path))
+    files = [kernel_cache.SOURCES.joinpath(*name.split(".")) for name in names]
+    imported = {
+        file
+        for at in files
+        for file in (at.with_suffix(".py"), at.parent.with_suffix(".py"))
+        if file.is_file()
+    }
+    assert imported and imported <= kernel_cache.sources_of(path)
 
 
 @pytest.fixture
