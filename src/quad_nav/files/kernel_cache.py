@@ -22,7 +22,8 @@ from quad_nav.files.cache_folder import require_writable, user_cache_folder
 
 COMPILE_S = 60
 """Wall time, about, in which one core compiles the kernels of a flight."""
-SOURCES = Path(__file__).resolve().parents[2]
+_THIS = Path(__file__).resolve()  # no part of a kernel
+SOURCES = _THIS.parents[2]
 _PACKAGE = SOURCES / "quad_nav"
 _IMPORT = re.compile(r"^(?:from|import) (quad_nav[\w.]*)(?: import (\w+))?", re.MULTILINE)
 
@@ -65,12 +66,13 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         # apart.
         file = os.path.realpath(function.__code__.co_filename)
         function.__code__ = function.__code__.replace(co_filename=file)
-        given = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = str(FOLDER / folder_name(Path(file)))
+        config: Any = numba.config
+        given = config.CACHE_DIR
+        config.CACHE_DIR = str(FOLDER / folder_name(Path(file)))
         try:
             return numba.njit(**options)(function)
         finally:
-            numba.config.CACHE_DIR = given
+            config.CACHE_DIR = given
 
     return decorate
 
@@ -107,7 +109,7 @@ def _imported(path: Path) -> List[Path]:
     for module, name in _IMPORT.findall(_content(path).decode()):
         at = SOURCES.joinpath(*module.split("."))
         files = (at.with_suffix(".py"), at / f"{name}.py")
-        found += [file for file in files if file.is_file()]
+        found += [file for file in files if file.is_file() and file != _THIS]
     return found
 
 

@@ -9,7 +9,7 @@ column to column until it hits something. That is the fastest for thousands.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Tuple
+from typing import Any, NamedTuple, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +25,13 @@ _RING_M, _RINGS = 1.0, 64  # rings around a LIDAR; the last one has no outer lim
 class Solids(NamedTuple):
     """Solids: kinds and sizes as in ``rays``, positions in ``map``, metres."""
 
-    kinds: NDArray[np.int64]
+    kinds: NDArray[Any]
     """int64[s]"""
-    centres: NDArray[np.float64]
+    centres: NDArray[Any]
     """float64[s, 3]"""
-    rotations: NDArray[np.float64]
+    rotations: NDArray[Any]
     """float64[s, 3, 3], the solids' axes in ``map`` as rows"""
-    sizes: NDArray[np.float64]
+    sizes: NDArray[Any]
     """float64[s, 3]"""
 
 
