@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 from quad_nav.control.evasion import evade, predicted_discs, prediction_times
-from quad_nav.control.surroundings import EvasionParams, Surroundings
-from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.grid import INSCRIBED, LETHAL, GridSpec
-from quad_nav.kernels.evasion_commands import Body, command_costs
-from quad_nav.kernels.space_time import SpaceTime, fill_costs, haste_per_s, threat
-from quad_nav.kernels.standing_obstacles import (
+from quad_nav.control.evasion_commands import Body, command_costs
+from quad_nav.control.space_time import SpaceTime, fill_costs, haste_per_s, threat
+from quad_nav.control.standing_obstacles import (
     StandingObstacles,
     fill_gaps,
     overlap_cost,
     overlap_costs,
 )
+from quad_nav.control.surroundings import EvasionParams, Surroundings
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.grid import INSCRIBED, LETHAL, GridSpec
 from quad_nav.tracking.tracks import Tracks
 
 ON = EvasionParams(True, clearance_m=0.1)

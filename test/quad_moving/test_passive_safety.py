@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from quad_nav.control.body_response import Body
 from quad_nav.control.evasion import evade
 from quad_nav.control.passive_safety import reachable_places
+from quad_nav.control.passive_safety_kernel import Reachable, rest_in_time
+from quad_nav.control.standing_obstacles import MARGIN_M, StandingObstacles
 from quad_nav.control.surroundings import BODY, EvasionParams, Surroundings
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
-from quad_nav.kernels.body_response import Body
-from quad_nav.kernels.passive_safety import Reachable, rest_in_time
-from quad_nav.kernels.standing_obstacles import MARGIN_M, StandingObstacles
 from quad_nav.tracking.tracks import Tracks
 
 PERIOD_S = 0.02

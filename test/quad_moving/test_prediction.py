@@ -13,12 +13,12 @@ from local_planner_cases import ORIGIN, SQUARE, WINDOW, free, line
 from quad_nav.control.dwa_critics import Critics
 from quad_nav.control.dwa_oscillation import OscillationCritic
 from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
+from quad_nav.control.moving_discs import MovingDiscs, passing_cost
 from quad_nav.control.prediction import NO_DISCS, join_discs, predict, rollout_discs
 from quad_nav.control.rollout import Rollout
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
+from quad_nav.costmap.collision import COLLIDES
 from quad_nav.geometry import Twist2D
-from quad_nav.kernels.collision import COLLIDES
-from quad_nav.kernels.moving_discs import MovingDiscs, passing_cost
 from quad_nav.navigator.control_supervisor import ControlSupervisor
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.tracking.tracks import Tracks

@@ -101,7 +101,7 @@ def exit_on_faults() -> Iterator[None]:
 
 def show_warnings(warnings: Iterable[str]) -> None:
     """Print the warnings of a set-up, and what a missing cache of the kernels costs."""
-    from quad_nav.kernels.jit import cache_warnings  # here, because numba loads slowly
+    from quad_nav.files.kernel_cache import cache_warnings  # here, because numba loads slowly
 
     for warning in (*warnings, *cache_warnings()):
         echo(warning, err=True)

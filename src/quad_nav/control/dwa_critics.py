@@ -35,9 +35,13 @@ from typing import NamedTuple, Optional, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control import dwa_kernel as kernel
+from quad_nav.control import dwa_search
 from quad_nav.control.dwa_oscillation import OscillationCritic
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.dwa_samples import acceleration_limits, velocity_samples
+from quad_nav.control.map_grid_kernel import distances_ahead
+from quad_nav.control.moving_discs import MovingDiscs
 from quad_nav.control.prediction import NO_DISCS
 from quad_nav.control.rollout import (
     Trajectory,
@@ -45,13 +49,9 @@ from quad_nav.control.rollout import (
     costmap_view,
     single,
 )
+from quad_nav.costmap.collision import highest_near
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
-from quad_nav.kernels import dwa as kernel
-from quad_nav.kernels import dwa_search
-from quad_nav.kernels.collision import highest_near
-from quad_nav.kernels.map_grid import distances_ahead
-from quad_nav.kernels.moving_discs import MovingDiscs
 
 NO_LEGAL_TRAJECTORY = -7.0
 

@@ -28,14 +28,14 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control.body_response import rest_s
+from quad_nav.control.evasion_commands import BOTH_S, command_costs
 from quad_nav.control.passive_safety import safe_commands
 from quad_nav.control.prediction import join_discs, predict
+from quad_nav.control.space_time import SUBSTEPS, SpaceTime, fill_costs
+from quad_nav.control.standing_obstacles import overlap_costs
 from quad_nav.control.surroundings import BODY, EvasionParams, Surroundings, polar
 from quad_nav.geometry import Twist2D
-from quad_nav.kernels.body_response import rest_s
-from quad_nav.kernels.evasion_commands import BOTH_S, command_costs
-from quad_nav.kernels.space_time import SUBSTEPS, SpaceTime, fill_costs
-from quad_nav.kernels.standing_obstacles import overlap_costs
 from quad_nav.tracking.tracks import Tracks
 
 Floats = NDArray[np.float64]

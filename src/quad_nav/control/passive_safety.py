@@ -22,8 +22,8 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control.passive_safety_kernel import Reachable, rest_in_time
 from quad_nav.control.surroundings import BODY, EvasionParams, Surroundings
-from quad_nav.kernels.passive_safety import Reachable, rest_in_time
 from quad_nav.tracking.tracks import Tracks
 
 Floats = NDArray[np.float64]

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control.plan_follower_kernel import count_farther, stretch_near
 from quad_nav.control.prediction import NO_DISCS
 from quad_nav.errors import NoLocalPlan
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import GridSpec
-from quad_nav.kernels.plan_follower import count_farther, stretch_near
 
 NO_POSES = np.zeros((0, 3))
 _PASSED_BEYOND_M = 1.0

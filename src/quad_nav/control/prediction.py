@@ -11,8 +11,8 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control.moving_discs import MovingDiscs
 from quad_nav.geometry import Pose2D
-from quad_nav.kernels.moving_discs import MovingDiscs
 from quad_nav.tracking.tracks import Tracks
 
 Floats = NDArray[np.float64]

@@ -10,11 +10,11 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control.body_response import Body
 from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
+from quad_nav.control.standing_obstacles import StandingObstacles, fill_gaps
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
-from quad_nav.kernels.body_response import Body
-from quad_nav.kernels.standing_obstacles import StandingObstacles, fill_gaps
 from quad_nav.parameter import flag, number
 from quad_nav.tracking.tracks import max_acceleration
 

@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.costmap.cost_grid import EVERYWHERE, Bounds, CostGrid, Window
+from quad_nav.costmap.inflation_kernel import STEP_BITS, Ranks, inflate
 from quad_nav.costmap.layer import Layer, LayerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import INSCRIBED, LETHAL, GridSpec
-from quad_nav.kernels.inflation import STEP_BITS, Ranks, inflate
 from quad_nav.parameter import flag, number
 
 

@@ -9,7 +9,7 @@ from typing import Callable, List, Optional, Tuple, Union
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.observations import (
+from quad_nav.costmap.observation_kernel import (
     ObservationStack,
     Ranges,
     store_marks,

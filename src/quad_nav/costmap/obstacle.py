@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.costmap.cost_grid import Bounds, CostGrid, Window, merge_known, merge_maximum
+from quad_nav.costmap.cost_grid_kernel import place_polygon
 from quad_nav.costmap.layer import GridLayer, LayerParams, Redraw
 from quad_nav.costmap.observation import Observation, ObservationBuffer, SourceParams
+from quad_nav.costmap.observation_kernel import Ranges
 from quad_nav.costmap.projection import scan_points, transform_points
+from quad_nav.costmap.projection_kernel import outside_circles
+from quad_nav.costmap.raytrace import clear_all_rays, mark_all_points
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
-from quad_nav.kernels.cost_grid import place_polygon
-from quad_nav.kernels.observations import Ranges
-from quad_nav.kernels.projection import outside_circles
-from quad_nav.kernels.raytrace import clear_all_rays, mark_all_points
 from quad_nav.parameter import (
     Choice,
     choice,

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.costmap.observation import SourceParams
+from quad_nav.costmap.projection_kernel import count_returns
 from quad_nav.geometry import Pose3D, Scan, angle_difference
-from quad_nav.kernels.projection import count_returns
 from quad_nav.parameter import flag
 
 _ELSEWHERE_M, _ELSEWHERE_RAD = 0.05, 0.05

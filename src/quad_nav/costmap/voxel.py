@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from quad_nav.costmap.cost_grid import shift
 from quad_nav.costmap.observation import ObservationBuffer
 from quad_nav.costmap.obstacle import ObstacleLayer, ObstacleLayerParams, combination_choice
+from quad_nav.costmap.voxel_kernel import RayLimits, VoxelGrid, clear_voxel_rays, mark_voxels
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
-from quad_nav.kernels.voxels import RayLimits, VoxelGrid, clear_voxel_rays, mark_voxels
 from quad_nav.parameter import POSITIVE, deviation, fixed_flag, positive, signed, whole
 
 

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from quad_nav.control.controller import Control, LocalPlanner
 from quad_nav.control.escape import escape
+from quad_nav.control.moving_discs import MovingDiscs
 from quad_nav.control.plan_follower import PlanFollower
 from quad_nav.control.prediction import NO_DISCS
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.errors import ControlError, NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.kernels.moving_discs import MovingDiscs
 from quad_nav.navigator.parameter_limiter import ParameterLimiter
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.parameter import number

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.evasion import evade
+from quad_nav.control.moving_discs import MovingDiscs
 from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
 from quad_nav.control.prediction import NO_DISCS, rollout_discs
 from quad_nav.control.surroundings import EvasionParams, Surroundings
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
-from quad_nav.kernels.moving_discs import MovingDiscs
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.tracking.tracks import Tracks
 

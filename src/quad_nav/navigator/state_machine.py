@@ -12,13 +12,13 @@ import math
 from typing import Optional, Sequence
 
 from quad_nav.control.controller import LocalPlanner
+from quad_nav.control.moving_discs import MovingDiscs
 from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
 from quad_nav.control.prediction import NO_DISCS
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.map_edge import closed_edge
 from quad_nav.errors import PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.kernels.moving_discs import MovingDiscs
 from quad_nav.navigator.control_supervisor import ControlSupervisor, StuckAction, escape_command
 from quad_nav.navigator.costmap_updates import CostmapUpdates
 from quad_nav.navigator.evasion_guard import EvasionGuard, speed_limits

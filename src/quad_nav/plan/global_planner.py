@@ -31,9 +31,9 @@ from numpy.typing import NDArray
 from quad_nav.errors import NoPath
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
-from quad_nav.kernels import global_planner as kernel
-from quad_nav.kernels import wave as wavefront
 from quad_nav.parameter import POSITIVE, choice, fixed_flag, fixed_whole, flag, signed, whole
+from quad_nav.plan import global_planner_kernel as kernel
+from quad_nav.plan import wavefront_kernel as wavefront
 from quad_nav.plan.navfn import goal_cell_of, start_cell_of
 from quad_nav.plan.orientations import ORIENTATIONS, with_headings
 from quad_nav.plan.wavefront import Wavefront

@@ -28,9 +28,9 @@ from numpy.typing import NDArray
 from quad_nav.errors import GoalOutsideMap, NoPath, StartOutsideMap
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, INSCRIBED, UNKNOWN, GridSpec
-from quad_nav.kernels import descent as kernel
-from quad_nav.kernels import wave as wavefront
 from quad_nav.parameter import fixed_flag, fixed_number
+from quad_nav.plan import descent as kernel
+from quad_nav.plan import wavefront_kernel as wavefront
 from quad_nav.plan.wavefront import NOT_REACHED, Wavefront
 
 Cell = Tuple[int, int]

@@ -1,20 +1,15 @@
 """Compile the kernels before anything flies.
 
 numba compiles a kernel at its first call, which takes seconds, and caches the result beside the
-source, or in the user's cache if that folder is not writable. ``python -m
-quad_nav.scenario.warm_up`` fills the cache at installation and builds the library of compiled
-kernels, with which no process needs numba. A node warms up its own configuration before it accepts
-goals, which is quick with either.
+sources, or in the user's cache if that folder is not writable. ``python -m
+quad_nav.scenario.warm_up`` fills the cache at installation. A node warms up its own configuration
+before it accepts goals, which is quick with a full cache.
 """
 
 from __future__ import annotations
 
 import math
-import os
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Dict, Tuple
 
 import numpy as np
@@ -25,10 +20,8 @@ from quad_nav.control.surroundings import EvasionParams, Surroundings
 from quad_nav.control.trajectory_planner import TrajectoryPlanner
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.scan_validator import ScanValidator
-from quad_nav.errors import printable
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.grid import GridSpec
-from quad_nav.kernels import jit, library
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import RobotPoses
 from quad_nav.peers.peer import HIGHEST_PRIORITY, Intention, Peer
@@ -188,30 +181,5 @@ def fly_missions() -> None:
         )
 
 
-def main() -> None:
-    """Compile the kernels and build the library of them, unless it is there already."""
-    fly_missions()
-    if jit.numba_kernels():
-        if library.FOLDER is not None:
-            _build(library.library_path(library.FOLDER))
-    elif jit.library_remarks():  # it lacks some types
-        again = [sys.executable, "-m", "quad_nav.scenario.warm_up"]
-        # -m imports from the folder in which it starts.
-        sources, environment = Path(__file__).parents[2], {**os.environ, "QUAD_KERNELS": "numba"}
-        subprocess.run(again, check=True, cwd=sources, env=environment)
-
-
-def _build(path: Path) -> None:
-    from quad_nav.kernels.build_library import BuildError, build  # here: it imports numba
-
-    try:
-        build(jit.numba_kernels(), path)
-    except BuildError as error:
-        line = f"kernels: the library is not built: {error}; numba loads them"
-        print(printable(line), file=sys.stderr)
-    else:
-        print(printable(f"kernels: built {path}"))
-
-
 if __name__ == "__main__":
-    main()
+    fly_missions()

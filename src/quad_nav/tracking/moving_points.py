@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose3D, Scan, angle_difference
-from quad_nav.kernels.earlier_scans import (
+from quad_nav.tracking.earlier_scans import (
     Doubts,
     EarlierScans,
     Order,
