@@ -17,7 +17,6 @@ from quad_nav.kernels.body_response import Body
 from quad_nav.kernels.standing_obstacles import StandingObstacles, fill_gaps
 from quad_nav.parameter import flag, number
 from quad_nav.tracking.motion_memory import MotionMemory
-from quad_nav.tracking.tracks import max_acceleration
 
 Floats = NDArray[np.float64]
 
@@ -48,10 +47,14 @@ class EvasionParams:
     watch_s: float = number(
         "watch", 0.0, "seconds", 0, 1000, "Hover and watch before the first goal."
     )
-    speed_mps: float = number("evasion_speed", 0.0, "metres/s", 0, 10, "0 for the local planner's.")
-    max_acceleration_mps2: float = max_acceleration()
+    speed_mps: float = number(
+        "evasion_speed", 0.0, "metres/s", 0, 10, "Greatest speed of evasions; 0: as usual."
+    )
+    max_acceleration_mps2: float = number(
+        "max_acceleration", 0.0, "metres/s^2", 0, 100, "Obstacles' greatest; 0: no passive safety."
+    )
     walking_mps: float = number(
-        "max_speed", 1.6, "metres/s", 0.1, 10, "Greatest speed of obstacles then."
+        "max_speed", 1.6, "metres/s", 0.1, 10, "Greatest speed of obstacles, for passive safety."
     )
 
 

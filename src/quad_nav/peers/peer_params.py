@@ -35,8 +35,8 @@ class PeerParams:
         "yield_to_strangers", False, "Make room for a tracked obstacle in the way.", upstream=False
     )
     plan_behind_strangers: bool = flag(
-        "plan_behind_moving_obstacles", False, "Plans pass behind them.", upstream=False
+        "plan_behind_moving_obstacles", False, "Plan behind tracked obstacles.", upstream=False
     )
     stranger_patience_s: float = number(
-        "stranger_patience", 3.0, "seconds", 0.1, 60, "Time without progress until it makes room."
+        "stranger_patience", 3.0, "seconds", 0.1, 60, "Time until the robot makes room."
     )
