@@ -10,7 +10,8 @@ The arguments are the ROS name, default, unit, range and a sentence. YAML, dynam
 
 A ``fixed_...`` parameter is read once, at the start. The others can change in flight; they stand in
 the order of upstream's ``.cfg`` file. ``own=True`` marks a parameter that upstream does not have,
-in a namespace of upstream. ``upstream=...`` is the value that ``fixes/upstream`` sets.
+in a namespace of upstream. ``upstream=...`` marks one, too: it is the value that ``fixes/upstream``
+sets.
 """
 
 from __future__ import annotations
@@ -286,7 +287,7 @@ def _ranged(
 def _declared(parameter: Parameter, own: bool = False, **more: Any) -> Any:
     """Return the field of a dataclass with the parameter in its metadata."""
     metadata = {_UPSTREAM: more.pop(_UPSTREAM)} if _UPSTREAM in more else {}
-    parameter = dataclasses.replace(parameter, is_own=own, **more)
+    parameter = dataclasses.replace(parameter, is_own=own or bool(metadata), **more)
     default = parameter.in_force
     if default is not None:
         default = parameter.field_value(default)

@@ -79,8 +79,8 @@ class Configuration:
     body_radius_m: Optional[float] = fixed_number(
         "body_radius", None, "metres", "Radius of the simulated body.", POSITIVE, own=True
     )
-    robot: int = fixed_whole("robot", 0, "Number of this robot, see peers.md.", low=0, own=True)
-    robots: int = fixed_whole("robots", 0, "Number of robots, see peers.md.", low=0, own=True)
+    robot: int = fixed_whole("robot", 0, "Number of this robot in its fleet.", low=0, own=True)
+    robots: int = fixed_whole("robots", 0, "Number of robots that fly together.", low=0, own=True)
     size_from_scene: bool = fixed_flag(
         "size_from_scene", False, "The global costmap has the size of the scene.", own=True
     )

@@ -29,12 +29,16 @@ class FixesParams:
     upstream: bool = flag("upstream", False, "Behave as the C++ move_base, without any deviation.")
 
 
+def _group(*owners: type) -> Table:
+    return Table(owners, restores=True, is_own=True)
+
+
 GROUPS: Dict[str, Table] = {
-    "progress": Table((ProgressParams,), restores=True),
-    "scan_validator": Table((ScanValidatorParams,), restores=True),
-    "peers": Table((PeerParams,), restores=True),
-    "moving_obstacles": Table((TrackerParams, EvasionParams), restores=True),
-    FIXES: Table((FixesParams,), restores=True),
+    "progress": _group(ProgressParams),
+    "scan_validator": _group(ScanValidatorParams),
+    "peers": _group(PeerParams),
+    "moving_obstacles": _group(TrackerParams, EvasionParams),
+    FIXES: _group(FixesParams),
 }
 """Name of each group below the node's own namespace -> its parameters."""
 

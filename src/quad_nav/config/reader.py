@@ -28,12 +28,14 @@ class Table:
     Attributes:
         owners: Dataclasses that declare the parameters; a parameter of several owners is one.
         restores: True if dynamic_reconfigure can restore the namespace.
+        is_own: True if upstream has no such namespace.
         unsupported: Name -> reason of keys that move_base reads and this package does not.
         ignored: Name -> reason of keys that move_base ignores too.
     """
 
     owners: Tuple[type, ...]
     restores: bool = False
+    is_own: bool = False
     unsupported: Mapping[str, str] = field(default_factory=dict)
     ignored: Mapping[str, str] = field(default_factory=dict)
 
@@ -41,11 +43,9 @@ class Table:
     def reconfigurable(self) -> Tuple[Parameter, ...]:
         """Parameters that can change in flight: upstream's in its order, then our own."""
         found = [one for one in self._declared() if not one.is_fixed]
-        return (
-            *(one for one in found if not one.is_own),
-            *((RESTORE_DEFAULTS,) if self.restores else ()),
-            *(one for one in found if one.is_own),
-        )
+        added = [one for one in found if one.is_own and not self.is_own]
+        restore = [RESTORE_DEFAULTS] if self.restores else []
+        return (*(one for one in found if one not in added), *restore, *added)
 
     @property
     def fixed(self) -> Tuple[Parameter, ...]:

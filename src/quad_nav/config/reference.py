@@ -33,7 +33,8 @@ parameters, see `src/quad_nav/parameter.py`.
 Parameters have the names, places and meanings of ROS's `move_base` (navigation 1.17.3). A default
 is the value in force when nothing is set. Where the wiki differs from dynamic_reconfigure's
 description, the latter is used. Ranges are in parentheses. Values outside a range are clamped,
-with a warning. Parameters marked (R) can change in flight, with dynamic_reconfigure.
+with a warning. Parameters marked (R) can change in flight, with dynamic_reconfigure. Those marked
+(own) are not in upstream move_base.
 
 The navigator refuses wrong types and impossible values, such as a string for a number, NaN or a
 negative radius. It lists all errors before anything flies. It starts, with a warning for each, with
@@ -160,8 +161,9 @@ def reference() -> str:
 def _rows(table: Table) -> List[str]:
     rows = ["| name and default | meaning |", "| --- | --- |"]
     for parameter in table.parameters:
-        mark = " (R)" if parameter in table.reconfigurable else ""
-        unit = "" if parameter.kind == "str" else parameter.unit
+        mark = "" if parameter.is_fixed else " (R)"
+        mark += " (own)" if parameter.is_own and not table.is_own else ""
+        unit = "" if parameter.kind == "str" or parameter.default is None else parameter.unit
         values = f"{_default(parameter)} {unit}".strip()
         if _range(parameter):
             values += f" ({_range(parameter)})"

@@ -56,14 +56,14 @@ class DwaParams:
         "trans_stopped_vel", 0.1, "m/s", None, None, "Speed below which the robot has stopped."
     )
     rot_stopped_velocity_radps: float = number(
-        "theta_stopped_vel", 0.1, "rad/s", None, None, "The same for the rotational speed."
+        "theta_stopped_vel", 0.1, "rad/s", None, None, "Slower turns count as stopped."
     )
     sim_time_s: float = positive("sim_time", 1.7, "seconds", 0, None, "Duration of a rollout.")
     sim_granularity_m: float = positive(
         "sim_granularity", 0.025, "metres", 0, None, "Distance between the points of a rollout."
     )
     angular_sim_granularity_rad: float = positive(
-        "angular_sim_granularity", 0.1, "radians", 0, None, "The same for rotations."
+        "angular_sim_granularity", 0.1, "radians", 0, None, "Largest turn between points."
     )
     path_distance_bias: float = number(
         "path_distance_bias", 0.6, "", 0, None, "Weight of the distance to the path."
@@ -75,10 +75,10 @@ class DwaParams:
     twirling_scale: float = number("twirling_scale", 0.0, "", 0, None, "Weight of rotations.")
     stop_time_buffer_s: float = number("stop_time_buffer", 0.2, "seconds", 0, None, "Never used.")
     oscillation_reset_dist_m: float = number(
-        "oscillation_reset_dist", 0.05, "metres", 0, None, "Way until oscillation flags are reset."
+        "oscillation_reset_dist", 0.05, "metres", 0, None, "Movement that ends an oscillation."
     )
     oscillation_reset_angle_rad: float = number(
-        "oscillation_reset_angle", 0.2, "radians", 0, None, "Turn until they are reset."
+        "oscillation_reset_angle", 0.2, "radians", 0, None, "Turn that ends an oscillation."
     )
     forward_point_distance_m: float = signed(
         "forward_point_distance", 0.325, "metres", None, None, "Distance ahead of a scored point."
@@ -109,7 +109,7 @@ class DwaParams:
         "publish_cost_grid_pc", False, "Publish the scores of all cells as a point cloud."
     )
     global_frame_id: str = fixed_text(
-        "global_frame_id", "odom", "a frame's name", "Frame of that point cloud."
+        "global_frame_id", "odom", "a frame's name", "Frame of the point cloud of scores."
     )
     controller_frequency_hz: Optional[float] = fixed_number(
         "controller_frequency", None, "Hz", "Rate that sampling assumes; move_base's if unset.", ANY

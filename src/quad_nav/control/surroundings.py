@@ -16,7 +16,6 @@ from quad_nav.control.standing_obstacles import StandingObstacles, fill_gaps
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
 from quad_nav.parameter import flag, number
-from quad_nav.tracking.tracks import max_acceleration
 
 Floats = NDArray[np.float64]
 
@@ -44,10 +43,14 @@ class EvasionParams:
     glance_rad: float = number(
         "glance", 0.0, "radians", 0, 3.1416, "Look so far to both sides of the way."
     )
-    speed_mps: float = number("evasion_speed", 0.0, "metres/s", 0, 10, "0 for the local planner's.")
-    max_acceleration_mps2: float = max_acceleration()
+    speed_mps: float = number(
+        "evasion_speed", 0.0, "metres/s", 0, 10, "Greatest speed of evasions; 0: as usual."
+    )
+    max_acceleration_mps2: float = number(
+        "max_acceleration", 0.0, "metres/s^2", 0, 100, "Obstacles' greatest; 0: no passive safety."
+    )
     walking_mps: float = number(
-        "max_speed", 1.6, "metres/s", 0.1, 10, "Greatest speed of obstacles then."
+        "max_speed", 1.6, "metres/s", 0.1, 10, "Greatest speed of obstacles, for passive safety."
     )
 
 

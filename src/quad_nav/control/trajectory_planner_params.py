@@ -53,7 +53,7 @@ class TrajectoryPlannerParams:
         "sim_granularity", 0.025, "metres", 0, 5, "Distance between the points of a rollout."
     )
     angular_sim_granularity_rad: float = positive(
-        "angular_sim_granularity", 0.025, "radians", 0, math.pi / 2, "The same for rotations."
+        "angular_sim_granularity", 0.025, "radians", 0, math.pi / 2, "Largest turn between points."
     )
     path_distance_bias: float = number(
         "path_distance_bias", 0.6, "", 0, 5, "Weight of the distance to the path."
@@ -63,13 +63,13 @@ class TrajectoryPlannerParams:
     )
     occdist_scale: float = number("occdist_scale", 0.01, "", 0, 5, "Weight of obstacle costs.")
     oscillation_reset_dist_m: float = number(
-        "oscillation_reset_dist", 0.05, "metres", 0, 5, "Way until oscillation flags are reset."
+        "oscillation_reset_dist", 0.05, "metres", 0, 5, "Movement that ends an oscillation."
     )
     escape_reset_dist_m: float = number(
-        "escape_reset_dist", 0.1, "metres", 0, 5, "Way until the escape mode ends."
+        "escape_reset_dist", 0.1, "metres", 0, 5, "Movement that ends an escape."
     )
     escape_reset_theta_rad: float = number(
-        "escape_reset_theta", math.pi / 2, "radians", 0, 5, "Turn until the escape mode ends."
+        "escape_reset_theta", math.pi / 2, "radians", 0, 5, "Turn that ends an escape."
     )
     vx_samples: int = whole("vx_samples", 20, "", 1, 300, "Sampled velocities in x.")
     vtheta_samples: int = whole("vtheta_samples", 20, "", 1, 300, "Sampled rotational velocities.")
@@ -77,7 +77,7 @@ class TrajectoryPlannerParams:
         "heading_lookahead", 0.325, "metres", 0, 5, "Distance ahead at which turns are compared."
     )
     holonomic_robot: bool = flag("holonomic_robot", True, "The robot can fly sideways.")
-    escape_vel_mps: float = signed("escape_vel", -0.1, "m/s", -2, 2, "Velocity of an escape.")
+    escape_vel_mps: float = signed("escape_vel", -0.1, "m/s", -2, 2, "Velocity in x of escapes.")
     dwa: bool = flag(
         "dwa", False, "Sample velocities that one period can reach, not a whole rollout."
     )
@@ -107,10 +107,10 @@ class TrajectoryPlannerParams:
         "latch_xy_goal_tolerance", False, "Once at the goal, only turn, even if the robot drifts."
     )
     rot_stopped_velocity_radps: float = fixed_number(
-        "rot_stopped_velocity", 0.01, "rad/s", "Rotational velocity of a robot that has stopped."
+        "rot_stopped_velocity", 0.01, "rad/s", "Rotational speed below which the robot has stopped."
     )
     trans_stopped_velocity_mps: float = fixed_number(
-        "trans_stopped_velocity", 0.01, "m/s", "Velocity below which the robot has stopped."
+        "trans_stopped_velocity", 0.01, "m/s", "Speed below which the robot has stopped."
     )
     prune_plan: bool = fixed_flag("prune_plan", True, "Remove the plan behind the robot.")
     meter_scoring: bool = fixed_flag(
@@ -120,7 +120,7 @@ class TrajectoryPlannerParams:
         "publish_cost_grid_pc", False, "Publish the scores of all cells as a point cloud."
     )
     global_frame_id: str = fixed_text(
-        "global_frame_id", "odom", "a frame's name", "Frame of that point cloud."
+        "global_frame_id", "odom", "a frame's name", "Frame of the point cloud of scores."
     )
     controller_frequency_hz: Optional[float] = fixed_number(
         "controller_frequency", None, "Hz", "Rate that rollouts assume; move_base's if unset.", ANY
@@ -128,7 +128,7 @@ class TrajectoryPlannerParams:
 
     # Our own
     respect_meter_scoring: bool = flag(
-        "respect_meter_scoring", False, "Upstream always scores in metres.", own=True
+        "respect_meter_scoring", False, "Upstream always scores in metres.", upstream=False
     )
 
     # Deviations from upstream

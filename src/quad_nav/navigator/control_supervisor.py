@@ -37,23 +37,17 @@ class ProgressParams:
 
     A robot that stays within ``distance_m`` for ``timeout_s`` gets a new plan; from then on
     ``stuck_cost_factor`` weighs obstacles less until it has moved by the oscillation distance.
-    After the same time again it runs the recoveries.
+    After the same time again it runs the recoveries. A time-out of 0 disables the checker.
     """
 
     timeout_s: float = number(
-        "timeout",
-        10.0,
-        "seconds",
-        0,
-        100,
-        "Time until a stuck robot replans; 0: never.",
-        upstream=0.0,
+        "timeout", 10.0, "seconds", 0, 100, "Time until a stuck robot replans.", upstream=0.0
     )
     distance_m: float = number(
         "distance", 0.1, "metres", 0, 10, "A robot that has moved so far makes progress."
     )
     stuck_cost_factor: float = number(
-        "stuck_cost_factor", 0.1, "", 0, 1, "Factor of occdist_scale then.", upstream=1.0
+        "stuck_cost_factor", 0.1, "", 0, 1, "Factor of occdist_scale if stuck.", upstream=1.0
     )
 
 

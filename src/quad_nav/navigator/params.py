@@ -44,13 +44,13 @@ class NavigatorParams:
         "controller_frequency", 20.0, "Hz", 0, 100, "Rate of velocity commands."
     )
     planner_patience_s: float = number(
-        "planner_patience", 5.0, "seconds", 0, 100, "Time without a plan until recoveries run."
+        "planner_patience", 5.0, "seconds", 0, 100, "Time without a plan until recoveries."
     )
     controller_patience_s: float = number(
-        "controller_patience", 5.0, "seconds", 0, 100, "The same for a command.", initial=15.0
+        "controller_patience", 5.0, "seconds", 0, 100, "Time without a command.", initial=15.0
     )
     max_planning_retries: int = whole(
-        "max_planning_retries", -1, "", -1, 1000, "Plans that fail until then; -1 for any number."
+        "max_planning_retries", -1, "", -1, 1000, "Failed plans until recoveries; -1: any number."
     )
     conservative_reset_dist_m: float = number(
         "conservative_reset_dist", 3.0, "metres", 0, 50, "Distance beyond which costs are cleared."
@@ -66,12 +66,7 @@ class NavigatorParams:
         "oscillation_timeout", 0.0, "seconds", 0, 60, "Oscillation until recoveries run; 0: never."
     )
     oscillation_distance_m: float = number(
-        "oscillation_distance",
-        0.5,
-        "metres",
-        0,
-        10,
-        "A robot that moves so far does not oscillate.",
+        "oscillation_distance", 0.5, "metres", 0, 10, "A robot that moves so far makes progress."
     )
     make_plan_clear_costmap: bool = flag(
         "make_plan_clear_costmap", True, "Clear the global costmap around the robot in make_plan."
@@ -82,20 +77,13 @@ class NavigatorParams:
 
     # Our own
     sensor_timeout_s: float = number(
-        "sensor_timeout",
-        1.0,
-        "seconds",
-        0,
-        100,
-        "Stop after such a silence.",
-        own=True,
-        upstream=0.0,
+        "sensor_timeout", 1.0, "seconds", 0, 100, "Stop after this time without data.", upstream=0.0
     )
     escape_collision: bool = flag(
-        "escape_collision", True, "Move out of contact.", own=True, upstream=False
+        "escape_collision", True, "A round robot in contact moves out of it.", upstream=False
     )
     plan_inside_map: bool = flag(
-        "plan_inside_map", True, "Plans keep off the map's edge.", own=True, upstream=False
+        "plan_inside_map", True, "Plans keep a radius from the edge of the map.", upstream=False
     )
     progress: ProgressParams = ProgressParams()
     evasion: EvasionParams = EvasionParams()

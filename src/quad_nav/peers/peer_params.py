@@ -35,5 +35,5 @@ class PeerParams:
         "yield_to_strangers", False, "Make room for a tracked obstacle in the way.", upstream=False
     )
     stranger_patience_s: float = number(
-        "stranger_patience", 3.0, "seconds", 0.1, 60, "Time without progress until it makes room."
+        "stranger_patience", 3.0, "seconds", 0.1, 60, "Time until the robot makes room."
     )

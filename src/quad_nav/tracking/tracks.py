@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,18 +11,6 @@ from quad_nav.geometry import Pose2D
 from quad_nav.parameter import flag, number
 
 Floats = NDArray[np.float64]
-
-
-def max_acceleration() -> Any:
-    """Declare ``max_acceleration``, which tracking and evasion read."""
-    return number(
-        "max_acceleration",
-        0.0,
-        "metres/s^2",
-        0,
-        100,
-        "Greatest acceleration of obstacles, before which the robot rests; 0: it need not.",
-    )
 
 
 @dataclass(frozen=True)
@@ -52,14 +39,11 @@ class TrackerParams:
         "timeout", 1.5, "seconds", 0, 60, "Hidden obstacles are kept so long."
     )
     margin_m: float = number(
-        "margin",
-        0.12,
-        "metres",
-        0,
-        1,
-        "A point moves that is so far in free space.",
+        "margin", 0.12, "metres", 0, 1, "A point moves that is so far in free space."
     )
-    max_acceleration_mps2: float = max_acceleration()
+    max_acceleration_mps2: float = number(
+        "max_acceleration", 0.0, "metres/s^2", 0, 100, "Obstacles' greatest; 0: no passive safety."
+    )
 
 
 @dataclass(frozen=True)
