@@ -152,7 +152,6 @@ def test_a_full_disk_names_what_is_kept_of_an_mcap_file(tmp_path):
                 ("--report", "x.html"),
                 ("--animate", "x.gif"),
                 ("--record", "x.bag"),
-                ("--view", "x.rrd"),
             )
         ),
         ("barn --worlds w.npz", "--json", "x.json"),
