@@ -21,7 +21,7 @@ from quad_nav import kernels
 
 for module in pkgutil.iter_modules(kernels.__path__):  # numba cannot compile atheris's hooks
     importlib.import_module(f"{kernels.__name__}.{module.name}")
-with atheris.instrument_imports(include=["quad_nav", "PIL", "yaml", "rosbags", "mcap"]):
+with atheris.instrument_imports(include=["quad_nav", "PIL", "yaml", "rosbags"]):
     from targets import TARGETS, run
 
     if sys.argv[1:2] == ["messages"]:  # the only one that needs ROS

@@ -31,7 +31,7 @@ def read(path, *topics):
 @pytest.mark.parametrize(
     "name, problem",
     [
-        ("flight.txt", "expected a name that ends with .bag or .mcap"),
+        ("flight.mcap", "expected a name that ends with .bag$"),
         ("file/flight.bag", "cannot write the recording: "),
         ("folder.bag", "is a folder"),
     ],

@@ -142,7 +142,7 @@ MAX_DRIFT = 1.0
 @click.option(
     "--record",
     type=A_FILE,
-    metavar="FILE.bag|FILE.mcap",
+    metavar="FILE.bag",
     help="Record the ROS topics, for rosbag play and RViz.",
 )
 @click.option(

@@ -1,4 +1,4 @@
-"""Flights as data: recorded as bags or MCAP, read back, and traced as arrays.
+"""Flights as data: recorded as bags, read back, and traced as arrays.
 
 Reading order: ``trace`` (a flight as arrays) and ``messages`` (ROS messages without ROS).
 Writing: ``record_file`` (the files), ``action_topics`` and ``navigator_topics`` (what a
