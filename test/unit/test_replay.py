@@ -10,8 +10,8 @@ from click.testing import CliRunner
 from hand_made_recording import LAST_S, write_flight, x_at
 
 from quad_nav.cli import main
-from quad_nav.recording import replay as replay_module
 from quad_nav.sim.scene import BODY_RADIUS_M
+from quad_web.replay import replay as replay_module
 from quad_web.replay.recorded_flight import RecordedFlight
 from quad_web.replay.replay import FASTEST, OpenedReplay, Replay
 from quad_web.view.actions import Answer
