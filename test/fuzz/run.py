@@ -22,7 +22,7 @@ SOURCES = Path(quad_nav.__file__).parents[1]
 for path in SOURCES.rglob("*.py"):  # numba cannot compile atheris's hooks
     if "import njit" in path.read_text():
         importlib.import_module(".".join(path.relative_to(SOURCES).with_suffix("").parts))
-with atheris.instrument_imports(include=["quad_nav", "PIL", "yaml", "rosbags", "mcap"]):
+with atheris.instrument_imports(include=["quad_nav", "PIL", "yaml", "rosbags"]):
     from targets import TARGETS, run
 
     if sys.argv[1:2] == ["messages"]:  # the only one that needs ROS

@@ -23,8 +23,6 @@ AMOUNT = click.FloatRange(min=0.0)
 COUNT = click.IntRange(min=1)
 OUTPUT = click.Path(dir_okay=False, allow_dash=True, path_type=Path)
 """Type of an option whose text ``-`` sends to standard output."""
-LIVE = "live"
-"""Value of ``--view`` without a file."""
 LOOPBACK = "127.0.0.1"
 
 

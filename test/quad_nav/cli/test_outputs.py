@@ -19,7 +19,6 @@ from quad_nav.cli import main
 from quad_nav.files import output
 from quad_nav.files.output import folder_faults, output_faults, replacing, write_text
 from quad_nav.mission.summary import MissionSummary, write_json
-from quad_nav.recording.record_file import create
 
 FULL = "No space left on device"
 FLY = ("fly", "-q", "--time-limit", "0.2", "--beams", "64", "--config", "tutorial")
@@ -135,13 +134,6 @@ def test_a_summary_on_a_full_disk_leaves_nothing(tmp_path):
     assert names(tmp_path) == []
 
 
-def test_a_full_disk_names_what_is_kept_of_an_mcap_file(tmp_path):
-    file = create(tmp_path / "x.mcap")
-    with SizeLimit(100), pytest.raises(OSError, match=r"x.mcap.active keeps what fits, `mcap rec"):
-        file.add_topic("/t", "std_msgs/String", False, "/test")
-        file.close()
-
-
 @pytest.mark.parametrize(
     "command, option, name",
     [
@@ -152,7 +144,6 @@ def test_a_full_disk_names_what_is_kept_of_an_mcap_file(tmp_path):
                 ("--report", "x.html"),
                 ("--animate", "x.gif"),
                 ("--record", "x.bag"),
-                ("--view", "x.rrd"),
             )
         ),
         ("barn --worlds w.npz", "--json", "x.json"),

@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import resource
-import sys
-import types
 
 import numpy as np
 import pytest
@@ -33,7 +31,7 @@ def read(path, *topics):
 @pytest.mark.parametrize(
     "name, problem",
     [
-        ("flight.txt", "expected a name that ends with .bag or .mcap"),
+        ("flight.mcap", "expected a name that ends with .bag$"),
         ("file/flight.bag", "cannot write the recording: "),
         ("folder.bag", "is a folder"),
     ],
@@ -173,23 +171,10 @@ def test_a_stop_reason_of_an_observer_ends_the_flight(tmp_path):
 # The command line.
 
 
-@pytest.mark.parametrize(
-    "option, problem",
-    [
-        (
-            ["--record", "flight.txt"],
-            "flight.txt: unknown recording format; expected a name that ends",
-        ),
-        (
-            ["--view", "flight.bag"],
-            "flight.bag: unknown format of a view; expected a name that ends",
-        ),
-    ],
-)
-def test_a_bad_file_ends_with_status_2_before_anything_flies(monkeypatch, option, problem):
-    monkeypatch.setitem(sys.modules, "rerun", types.ModuleType("rerun"))
-    result = CliRunner().invoke(main, ["fly", "-q", *option])
+def test_a_bad_file_ends_with_status_2_before_anything_flies():
+    result = CliRunner().invoke(main, ["fly", "-q", "--record", "flight.txt"])
     assert result.exit_code == 2
+    problem = "flight.txt: unknown recording format; expected a name that ends"
     assert f"flight not started, invalid input:\n  {problem}" in result.output
 
 

@@ -69,11 +69,11 @@ def test_a_record_without_places_and_one_that_forgets():
     assert np.isnan(places_of(record, 0.05)).all() and places_of(record, 0.15) == [[[0.0, 0.0]]]
 
 
-@pytest.fixture(scope="module", params=["flight.bag", "flight.mcap"])
-def flown(request, tmp_path_factory):
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
     """The summary of a flight among people who react, its trace and the one that was recorded."""
     folder = tmp_path_factory.mktemp("people")
-    path = folder / request.param
+    path = folder / "flight.bag"
     given = setup(folder, seed=2, time_limit_s=6.0)
     given = replace(given, scene=replace(given.scene, walkers=PEOPLE))
     observer = TraceObserver()
