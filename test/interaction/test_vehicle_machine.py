@@ -67,6 +67,7 @@ class Known:
     Attributes:
         may_take_off: Somebody, or the begin of the mission, has asked for a take-off.
         is_armed: At the last step.
+        disarmed_s: When its motors have stopped last.
         taken_s: Since when its pilot has it, or it hovers since its bridge has died; else None.
         is_stopped: Its mission is stopped, or must be.
         changed_s: When its bridge, its link or the mission has changed last.
@@ -77,7 +78,7 @@ class Known:
     def __init__(self, now_s):
         self.may_take_off, self.is_armed, self.is_stopped = True, False, False
         self.taken_s = self.poor_s = None
-        self.changed_s = self.stepped_s = now_s
+        self.changed_s = self.stepped_s = self.disarmed_s = now_s
 
 
 class Request(NamedTuple):
@@ -161,6 +162,7 @@ class VehicleMachine(RuleBasedStateMachine):
             if vehicle.armed and not known.is_armed and not known.may_take_off:
                 self.faults.append(f"{self.now_s:.2f}: vehicle {number} is armed without an order")
             if known.is_armed and not vehicle.armed:
+                known.disarmed_s = self.now_s
                 known.may_take_off, known.taken_s = self.is_asked_to_take_off(number), None
             known.is_armed = vehicle.armed
             self.check_sent(number, known, radio)
@@ -184,6 +186,9 @@ class VehicleMachine(RuleBasedStateMachine):
                 known.may_take_off = might_take_off or self.is_asked_to_take_off(number)
             if is_left_out or not request.takes_control:
                 continue
+            is_down = not known.is_armed and request.asked_s - known.disarmed_s > TOLD_S
+            if is_down and not request.takes_off:
+                self.faults.append(f"{self.now_s:.2f}: vehicle {number} resumes on the ground")
             if known.taken_s is None or known.taken_s < request.asked_s:
                 known.taken_s = None
                 known.is_stopped &= request.takes_off
