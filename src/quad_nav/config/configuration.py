@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 
 from quad_nav.config.costmaps import costmap_params, normalise_costmap, remark_on_blindness
-from quad_nav.config.fixes import GROUPS, group_params, normalise_groups, with_fixes
+from quad_nav.config.fixes import GROUPS, normalise_groups, own_params, with_fixes
 from quad_nav.config.notes import CAUTION, MAPPED, OTHER_ROBOT, Notes, Remark, join
 from quad_nav.config.planners import (
     local_planner_frequency,
@@ -106,7 +106,8 @@ class Configuration:
         return copy.deepcopy(dict(self.tree))
 
 
-MOVE_BASE_TABLE = Table((NavigatorParams, Configuration), restores=True)
+_OF_NODE = (NavigatorParams, ProgressParams, ScanValidatorParams, Configuration)
+MOVE_BASE_TABLE = Table(_OF_NODE, restores=True)
 
 
 def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
@@ -159,7 +160,7 @@ def _made(
         Configuration,
         tree,
         navigator=navigator_params(tree, listed, given),
-        **own_params(tree),
+        **own_parts(tree),
         global_costmap=costmap_params(tree, "global_costmap"),
         local_costmap=costmap_params(tree, "local_costmap"),
         global_planner=planner_params(tree, "base_global_planner"),
@@ -187,18 +188,18 @@ def navigator_params(
         tree,
         given,
         recovery_behaviors=listed,
-        progress=group_params(ProgressParams, "progress", tree),
-        evasion=group_params(EvasionParams, "moving_obstacles", tree),
+        progress=own_params(ProgressParams, tree),
+        evasion=own_params(EvasionParams, tree, "moving_obstacles"),
     )
     return with_fixes(params, tree)
 
 
-def own_params(tree: Mapping[str, Any]) -> Dict[str, Any]:
-    """Make the dataclasses of our own groups that are fields of a ``Configuration``."""
+def own_parts(tree: Mapping[str, Any]) -> Dict[str, Any]:
+    """Make the dataclasses of our own parameters that are fields of a ``Configuration``."""
     return {
-        "peers": group_params(PeerParams, "peers", tree),
-        "scan_validator": group_params(ScanValidatorParams, "scan_validator", tree),
-        "tracker": group_params(TrackerParams, "moving_obstacles", tree),
+        "peers": own_params(PeerParams, tree, "peers"),
+        "scan_validator": own_params(ScanValidatorParams, tree),
+        "tracker": own_params(TrackerParams, tree, "moving_obstacles"),
     }
 
 

@@ -11,7 +11,7 @@ from quad_nav.config.configuration import (
     MOVE_BASE_TABLE,
     Configuration,
     navigator_params,
-    own_params,
+    own_parts,
     workload_problems,
 )
 from quad_nav.config.costmaps import COSTMAP_TABLE, costmap_params
@@ -119,37 +119,20 @@ def _clamped(parameter: Parameter, value: Any) -> Any:
 
 
 def _remade(configuration: Configuration, namespace: str) -> Configuration:
-    """The dataclass of that namespace from the tree; the others stay as they are."""
-    tree = configuration.tree
-    if namespace == "":
-        listed = configuration.navigator.recovery_behaviors
-        return replace(configuration, navigator=navigator_params(tree, listed, given=tree))
-    if namespace in GROUPS:
-        return _with_other_groups(configuration)
-    if namespace in reconfigurable_planners(tree):
-        return replace(
-            configuration,
-            global_planner=planner_params(tree, "base_global_planner"),
-            local_planner=planner_params(tree, "base_local_planner"),
-        )
-    costmap = namespace.split("/")[0]
-    params = costmap_params(tree, costmap)
-    if costmap == "global_costmap":
-        return replace(configuration, global_costmap=params)
-    return replace(configuration, local_costmap=params)
-
-
-def _with_other_groups(configuration: Configuration) -> Configuration:
-    """Make every part anew that may change in flight: recoveries may not."""
+    """Make the parts that may change in flight anew from the tree; recoveries may not."""
     tree, before = configuration.tree, configuration.navigator
     navigator = navigator_params(tree, before.recovery_behaviors, given=tree)
+    if namespace:  # move_base itself is not reconfigured
+        patience_s = before.controller_patience_s
+        navigator = replace(navigator, controller_patience_s=patience_s)
     return replace(
         configuration,
-        navigator=replace(navigator, controller_patience_s=before.controller_patience_s),
+        navigator=navigator,
+        global_planner=planner_params(tree, "base_global_planner"),
         local_planner=planner_params(tree, "base_local_planner"),
-        **own_params(tree),
         global_costmap=costmap_params(tree, "global_costmap"),
         local_costmap=costmap_params(tree, "local_costmap"),
+        **own_parts(tree),
     )
 
 
