@@ -264,7 +264,7 @@ def as_upstream(params: _Params) -> _Params:
         value = getattr(params, one.name)
         if _UPSTREAM in one.metadata:
             changed[one.name] = one.metadata[_UPSTREAM]
-        elif dataclasses.is_dataclass(value):
+        elif dataclasses.is_dataclass(value) and not isinstance(value, type):
             changed[one.name] = as_upstream(value)
     replaced: _Params = dataclasses.replace(cast(Any, params), **changed)
     return replaced

@@ -28,7 +28,8 @@ _OTHER_LIMITS = ("holonomic_robot", "base_local_planner")  # another planner has
 _PROTECTED = re.compile(
     r"footprint.*|robot_radius|(in|circum)scribed_radius|.*tolerance|expected_update_rate"
     r"|(trans|rot|theta)_stopped_vel(ocity)?|scaling_speed|max_scaling_factor"
-    r"|sensor_timeout|escape_collision|plan_inside_map|respect_meter_scoring"
+    r"|sensor_timeout|escape_collision|plan_inside_map|respect_meter_scoring|reject_implausible_scans"
+    r"|progress_(timeout|distance)|stuck_cost_factor"
 )
 
 

@@ -6,23 +6,33 @@ import copy
 from dataclasses import dataclass, field, replace
 from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 
-from quad_nav.config.costmaps import costmap_params, normalise_costmap, remark_on_blindness
-from quad_nav.config.fixes import GROUPS, group_params, normalise_groups, with_fixes
+from quad_nav.config.costmaps import (
+    COSTMAP_TABLE,
+    costmap_params,
+    normalise_costmap,
+    remark_on_blindness,
+)
+from quad_nav.config.fixes import GROUPS, normalise_groups, own_params, with_fixes
+from quad_nav.config.layers import LAYERS, SOURCE_TABLE, source_names
 from quad_nav.config.notes import CAUTION, MAPPED, OTHER_ROBOT, Notes, Remark, join
 from quad_nav.config.planners import (
+    SLOTS,
     local_planner_frequency,
     local_planner_period_s,
     normalise_planner_names,
     normalise_planners,
     planner_keys,
     planner_params,
+    planner_type,
 )
 from quad_nav.config.plugins import plugin_name
 from quad_nav.config.reader import Table, made, normalise
 from quad_nav.config.recoveries import (
+    TABLES,
     NamedTypes,
     RecoveryParams,
     circumscribed_radius_m,
+    full_type,
     listed_names,
     normalise_recoveries,
     recoveries,
@@ -106,7 +116,41 @@ class Configuration:
         return copy.deepcopy(dict(self.tree))
 
 
-MOVE_BASE_TABLE = Table((NavigatorParams, Configuration), restores=True)
+_OF_NODE = (NavigatorParams, ProgressParams, ScanValidatorParams, Configuration)
+MOVE_BASE_TABLE = Table(_OF_NODE, restores=True)
+
+
+def tables_of(tree: Mapping[str, Any]) -> Iterator[Tuple[str, Table, Mapping[str, Any]]]:
+    """Yield (path, parameters, namespace) of what is known of a normalised tree.
+
+    They are in the order of move_base's dynamic_reconfigure servers. Plugins are not known.
+    """
+    tables = {"": MOVE_BASE_TABLE}
+    for key in SLOTS:
+        planner = planner_type(tree, key) if key in tree else None
+        if planner is not None:
+            tables[plugin_name(tree[key])] = planner.table
+    for costmap in COSTMAPS:
+        tables[costmap] = COSTMAP_TABLE
+        for plugin in below(tree, costmap).get("plugins", ()):
+            layer = join(costmap, plugin["name"])
+            if plugin["type"] in LAYERS:
+                tables[layer] = LAYERS[plugin["type"]]
+                for source in source_names(below(tree, layer)):
+                    tables[join(layer, source)] = SOURCE_TABLE
+    for entry in tree.get("recovery_behaviors", ()):
+        if full_type(entry["type"]) in TABLES:
+            tables[entry["name"]] = TABLES[full_type(entry["type"])]
+    for path, table in {**tables, **GROUPS}.items():
+        yield path, table, below(tree, path)
+
+
+def below(tree: Mapping[str, Any], path: str) -> Any:
+    """Return the namespace at a path, {} if there is none."""
+    for name in filter(None, path.split("/")):
+        found = tree.get(name)
+        tree = found if isinstance(found, dict) else {}
+    return tree
 
 
 def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
@@ -159,7 +203,7 @@ def _made(
         Configuration,
         tree,
         navigator=navigator_params(tree, listed, given),
-        **own_params(tree),
+        **own_parts(tree),
         global_costmap=costmap_params(tree, "global_costmap"),
         local_costmap=costmap_params(tree, "local_costmap"),
         global_planner=planner_params(tree, "base_global_planner"),
@@ -187,18 +231,18 @@ def navigator_params(
         tree,
         given,
         recovery_behaviors=listed,
-        progress=group_params(ProgressParams, "progress", tree),
-        evasion=group_params(EvasionParams, "moving_obstacles", tree),
+        progress=own_params(ProgressParams, tree),
+        evasion=own_params(EvasionParams, tree, "moving_obstacles"),
     )
     return with_fixes(params, tree)
 
 
-def own_params(tree: Mapping[str, Any]) -> Dict[str, Any]:
-    """Make the dataclasses of our own groups that are fields of a ``Configuration``."""
+def own_parts(tree: Mapping[str, Any]) -> Dict[str, Any]:
+    """Make the dataclasses of our own parameters that are fields of a ``Configuration``."""
     return {
-        "peers": group_params(PeerParams, "peers", tree),
-        "scan_validator": group_params(ScanValidatorParams, "scan_validator", tree),
-        "tracker": group_params(TrackerParams, "moving_obstacles", tree),
+        "peers": own_params(PeerParams, tree, "peers"),
+        "scan_validator": own_params(ScanValidatorParams, tree),
+        "tracker": own_params(TrackerParams, tree, "moving_obstacles"),
     }
 
 

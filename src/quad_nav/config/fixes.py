@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from typing import Any, Dict, Mapping, Type, TypeVar
 
 from quad_nav.config.notes import UNKNOWN, Notes, join
+from quad_nav.config.plugins import plugin_name
 from quad_nav.config.reader import Namespace, Table, made, normalise, subtree
 from quad_nav.control.surroundings import EvasionParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.navigator.control_supervisor import ProgressParams
-from quad_nav.parameter import as_upstream, flag
+from quad_nav.navigator.params import DEFAULT_LOCAL_PLANNER, NavigatorParams
+from quad_nav.parameter import as_upstream, flag, parameters_of
 from quad_nav.peers.peer_params import PeerParams
 from quad_nav.tracking.tracks import TrackerParams
 
@@ -34,22 +36,16 @@ def _group(*owners: type) -> Table:
 
 
 GROUPS: Dict[str, Table] = {
-    "progress": _group(ProgressParams),
-    "scan_validator": _group(ScanValidatorParams),
     "peers": _group(PeerParams),
     "moving_obstacles": _group(TrackerParams, EvasionParams),
     FIXES: _group(FixesParams),
 }
 """Name of each group below the node's own namespace -> its parameters."""
 
-# The group ``fixes`` had the parameters of all groups, some with such a word before their names.
-_OLD_WORDS = {"progress": "progress_", "peers": "peer_", "moving_obstacles": "moving_obstacle_"}
-_MOVED = {
-    "sensor_timeout": "sensor_timeout",
-    "escape_collision": "escape_collision",
-    "plan_inside_map": "plan_inside_map",
-    "respect_meter_scoring": "TrajectoryPlannerROS/respect_meter_scoring",
-}
+# Parameters that stood in the group ``fixes`` and are now at the node's level.
+_OF_NODE = (NavigatorParams, ProgressParams, ScanValidatorParams)
+# Words that these had before their names there.
+_OLD_WORDS = {"peers": "peer_", "moving_obstacles": "moving_obstacle_"}
 
 
 def normalise_groups(tree: Namespace, notes: Notes) -> None:
@@ -71,7 +67,11 @@ def _new_place(name: str) -> str:
         for parameter in table.parameters:
             if name in (parameter.name, _OLD_WORDS.get(group, "") + parameter.name):
                 return join(group, parameter.name)
-    return _MOVED.get(name, join(FIXES, "upstream"))
+    if any(one.is_own and one.name == name for owner in _OF_NODE for one in parameters_of(owner)):
+        return name
+    if name == "respect_meter_scoring":
+        return join(plugin_name(DEFAULT_LOCAL_PLANNER), name)
+    return join(FIXES, "upstream")
 
 
 def is_upstream(tree: Mapping[str, Any]) -> bool:
@@ -84,6 +84,6 @@ def with_fixes(params: _Params, tree: Mapping[str, Any]) -> _Params:
     return as_upstream(params) if is_upstream(tree) else params
 
 
-def group_params(owner: Type[_Params], group: str, tree: Mapping[str, Any]) -> _Params:
-    """Make a dataclass from its group in a normalised tree."""
-    return with_fixes(made(owner, tree.get(group, {})), tree)
+def own_params(owner: Type[_Params], tree: Mapping[str, Any], group: str = "") -> _Params:
+    """Make a dataclass of our own parameters from a group of a normalised tree, or its top."""
+    return with_fixes(made(owner, tree.get(group, {}) if group else tree), tree)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, Iterable, List, Mapping, Optional, Tuple, Type
+from typing import Any, Dict, List, Mapping, Optional, Tuple, Type
 
 from quad_nav.config.notes import CAUTION, Notes, join
 from quad_nav.config.plugins import LAYER, Parameters, PluginLayerParams, is_dotted, load_class
@@ -85,7 +85,7 @@ def normalise_layer(
     if not issubclass(table.owners[0], ObstacleLayerParams):
         normalise(layer, path, table, notes)
         return
-    sources = _source_names(layer)
+    sources = source_names(layer)
     described = {key for key, value in layer.items() if isinstance(value, dict)}
     for source in sorted(described.difference(sources)):
         notes.remark(
@@ -123,7 +123,8 @@ def _normalise_plugin(
     check_class(layer_type, LAYER, join(costmap_path, "plugins", name), notes)
 
 
-def _source_names(layer: Mapping[str, Any]) -> List[str]:
+def source_names(layer: Mapping[str, Any]) -> List[str]:
+    """Return the names of a layer's sources."""
     names = layer.get("observation_sources", "")
     return names.split() if isinstance(names, str) else []
 
@@ -161,17 +162,10 @@ def _inherit_ranges(layer: Namespace, path: str, chain: Chain, notes: Notes) -> 
 def _layer_params(owner: Type[LayerParams], layer: Mapping[str, Any]) -> LayerParams:
     if not issubclass(owner, ObstacleLayerParams):
         return made(owner, layer)
-    names = _source_names(layer)
+    names = source_names(layer)
     sources = tuple(_source_params(layer.get(source, {}), source) for source in names)
     return made(owner, layer, sources=sources)
 
 
 def _source_params(source: Mapping[str, Any], name: str) -> SourceParams:
     return made(SourceParams, source, name=name, topic=source.get("topic") or name)
-
-
-def layer_tables(plugins: Iterable[Mapping[str, str]]) -> Dict[str, Table]:
-    """Return name -> table of the supported layers."""
-    return {
-        plugin["name"]: LAYERS[plugin["type"]] for plugin in plugins if plugin["type"] in LAYERS
-    }

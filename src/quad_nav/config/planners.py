@@ -191,19 +191,6 @@ def planner_params(tree: Mapping[str, Any], key: str) -> Any:
     return Plugin(load_class(tree[key], interface), parameters, interface.methods_of)
 
 
-def reconfigurable_planners(tree: Mapping[str, Any]) -> Dict[str, Table]:
-    """Return namespace -> table of the chosen planners with reconfigurable parameters.
-
-    The local planner comes first.
-    """
-    found = {}
-    for key in SLOTS:
-        own = planner_type(tree, key)
-        if own is not None and own.table.reconfigurable:
-            found[plugin_name(tree[key])] = own.table
-    return found
-
-
 def local_planner_frequency(tree: Mapping[str, Any]) -> Any:
     """Return the local planner's own ``controller_frequency``, None if it has none."""
     key = "base_local_planner"

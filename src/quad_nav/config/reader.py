@@ -159,6 +159,31 @@ def subtree(tree: Namespace, name: str, path: str, notes: Notes) -> Namespace:
     return value
 
 
+def named_types(entries: Any, place: str, kind: str, notes: Notes) -> Dict[str, str]:
+    """Return name -> type of a list of ``{name: , type: }``; report entries of another form.
+
+    Args:
+        entries: The list, as it was written.
+        place: Path of the list.
+        kind: What an entry names, with its article, for messages.
+        notes: Receives faults.
+    """
+    expected = "expected {name: , type: }"
+    if not isinstance(entries, list):
+        notes.problem(place, f"{entries!r} is not a list; expected a list of {{name: , type: }}")
+        return {}
+    found: Dict[str, str] = {}
+    for entry in entries:
+        words = (entry.get("name"), entry.get("type")) if isinstance(entry, dict) else ()
+        if not words or not all(isinstance(word, str) for word in words):
+            notes.problem(place, f"{entry!r} is not {kind}; {expected}")
+        elif entry["name"] in found:
+            notes.problem(place, f"{entry['name']!r} is used twice; expected unique names")
+        else:
+            found[entry["name"]] = entry["type"]
+    return found
+
+
 def check_class(name: str, interface: Interface, place: str, notes: Notes) -> None:
     """Report everything that a user's class lacks of the interface."""
     try:

@@ -8,7 +8,15 @@ from quad_nav.config.fixes import with_fixes
 from quad_nav.config.local_planners import TRAJECTORY_PLANNER
 from quad_nav.config.notes import CAUTION, IGNORED, UNSUPPORTED, Notes, join
 from quad_nav.config.plugins import RECOVERY, Parameters, Plugin, is_dotted, load_class
-from quad_nav.config.reader import Namespace, Table, check_class, made, normalise, subtree
+from quad_nav.config.reader import (
+    Namespace,
+    Table,
+    check_class,
+    made,
+    named_types,
+    normalise,
+    subtree,
+)
 from quad_nav.config.speed_limits import check_slow, slow_params
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.recovery import (
@@ -101,26 +109,8 @@ def _listed(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
     if "recovery_behaviors" not in tree:
         return None
     entries = tree["recovery_behaviors"]
-    if not isinstance(entries, list):
-        notes.problem(
-            "recovery_behaviors",
-            f"{entries!r} is not a list; expected a list of {{name: , type: }}",
-        )
-        return ()
-    listed: Dict[str, str] = {}
-    for entry in entries:
-        if not isinstance(entry, dict) or not all(
-            isinstance(entry.get(key), str) for key in ("name", "type")
-        ):
-            notes.problem(
-                "recovery_behaviors", f"{entry!r} is not a behaviour; expected {{name: , type: }}"
-            )
-        elif entry["name"] in listed:
-            notes.problem(
-                "recovery_behaviors", f"{entry['name']!r} is used twice; expected unique names"
-            )
-        else:
-            listed[entry["name"]] = full_type(entry["type"])
+    listed = named_types(entries, "recovery_behaviors", "a behaviour", notes)
+    listed = {name: full_type(kind) for name, kind in listed.items()}
     for name in [name for name, kind in listed.items() if kind not in TABLES]:
         if is_dotted(listed[name]):
             check_class(listed[name], RECOVERY, join("recovery_behaviors", name), notes)

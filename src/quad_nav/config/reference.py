@@ -107,12 +107,6 @@ _SECTIONS: Tuple[Tuple[str, str, Table], ...] = (
         "Our own: `upstream: true` restores [upstream bugs](upstream_bugs.md).",
         GROUPS[FIXES],
     ),
-    ("progress", "Our own: detection of a robot that makes no progress.", GROUPS["progress"]),
-    (
-        "scan_validator",
-        "Our own: see [what a robot does without data](safety.md).",
-        GROUPS["scan_validator"],
-    ),
     ("peers", "Our own: see [avoidance between robots](peers.md).", GROUPS["peers"]),
     (
         "moving_obstacles",

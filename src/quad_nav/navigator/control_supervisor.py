@@ -41,10 +41,10 @@ class ProgressParams:
     """
 
     timeout_s: float = number(
-        "timeout", 10.0, "seconds", 0, 100, "Time until a stuck robot replans.", upstream=0.0
+        "progress_timeout", 10.0, "seconds", 0, 100, "Time stuck until a new plan.", upstream=0.0
     )
     distance_m: float = number(
-        "distance", 0.1, "metres", 0, 10, "A robot that has moved so far makes progress."
+        "progress_distance", 0.1, "metres", 0, 10, "Movement that is progress.", own=True
     )
     stuck_cost_factor: float = number(
         "stuck_cost_factor", 0.1, "", 0, 1, "Factor of occdist_scale if stuck.", upstream=1.0

@@ -20,7 +20,7 @@ from quad_nav.offline import flight as offline
 GOALS = [[[1.0, 4.5]], [[8.5, 1.5]]]
 EVERY = {
     "moving_obstacles/track_moving_obstacles": True,
-    "scan_validator/reject_implausible_scans": False,
+    "reject_implausible_scans": False,
     "sensor_timeout": 0.2,
 }
 

@@ -76,7 +76,7 @@ def test_upstream_keeps_the_patience_of_the_first_reconfiguration():
     [
         ("avoid_peers", "peers/avoid_peers"),
         ("peer_margin", "peers/margin"),
-        ("progress_timeout", "progress/timeout"),
+        ("progress_timeout", "progress_timeout"),
         ("sensor_timeout", "sensor_timeout"),
         ("respect_meter_scoring", "TrajectoryPlannerROS/respect_meter_scoring"),
         ("moving_obstacle_range", "moving_obstacles/range"),
@@ -126,7 +126,7 @@ def test_deviations_reach_planner_and_recoveries(tree):
 def test_groups_can_be_changed_in_flight():
     configuration = load(TREE)
     navigator = build_navigator(configuration)
-    configuration = updated(configuration, "progress", {"timeout": 3.0})
+    configuration = updated(configuration, "", {"progress_timeout": 3.0})
     apply_configuration(navigator, configuration)
     assert navigator.params.progress.timeout_s == 3.0
     apply_configuration(navigator, updated(configuration, "fixes", {"upstream": True}))

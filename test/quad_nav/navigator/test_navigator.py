@@ -229,7 +229,7 @@ def test_oscillation_timeout_aborts_when_the_robot_stays_within_its_distance():
 
 
 def test_a_robot_without_progress_replans_then_recovers_then_aborts():
-    flight = Flight([NamedRecovery("r", FakeRecovery())], {"progress": {"timeout": 2.0}})
+    flight = Flight([NamedRecovery("r", FakeRecovery())], {"progress_timeout": 2.0})
     flight.navigator.set_goal(GOAL, 0.0)
     ticks = flight.until(12.0)
     warnings = [warning for tick in ticks for warning in tick.warnings]
@@ -239,7 +239,7 @@ def test_a_robot_without_progress_replans_then_recovers_then_aborts():
 
 
 def test_a_robot_without_progress_relaxes_the_obstacle_weight_until_it_has_moved():
-    flight = Flight(tree={"progress": {"timeout": 2.0}})
+    flight = Flight(tree={"progress_timeout": 2.0})
     weights = flight.controller
     weights.params = Weights(occdist_scale=0.01)
     flight.navigator.set_goal(GOAL, 0.0)
@@ -321,7 +321,7 @@ def test_a_rotation_pauses_without_sensor_data(tree, turns):
 
 
 def test_a_robot_that_stops_without_sensor_data_keeps_its_patience():
-    flight = Flight(tree={"progress": {"timeout": 1.0}, **ALONE})
+    flight = Flight(tree={"progress_timeout": 1.0, **ALONE})
     flight.navigator.set_goal(GOAL, 0.0)
     flight.local_costmap.stale = [("obstacle_layer/base_scan", 1.26)]
     flight.until(5.0)
