@@ -25,23 +25,23 @@ from figures import JSON_HELP, Figures
 from numpy.typing import NDArray
 from tabulate import tabulate
 
+from quad_moving.tracker import Tracker
 from quad_nav.barn.dynamic import flight_setup as dynabarn_setup
 from quad_nav.barn.dynamic import read_dynamic_setup
 from quad_nav.barn.setup import BarnOptions, read_barn_setup
 from quad_nav.barn.setup import flight_setup as barn_setup
+from quad_nav.config.plugins import Parameters
+from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.offline.run import fly
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.sim.motion import SPLINE
 from quad_nav.sim.movers import reach_m
-from quad_nav.tracking.tracker import ObstacleTracker
-from quad_nav.tracking.tracks import TrackerParams, Tracks
 
 Floats = NDArray[np.float64]
 
 ROOT = Path(__file__).resolve().parents[1]
-PARAMS = TrackerParams(track_moving_obstacles=True)
 VIEW_BEAMS = 4
 MOVES = 1.25
 MATCH_M = 0.5  # a track farther than this from every obstacle's disc is false
@@ -76,9 +76,9 @@ class Trial(FlightObserver):
 
     needs_single_process = True
 
-    def __init__(self, tally: Tally, params: TrackerParams = PARAMS) -> None:
+    def __init__(self, tally: Tally) -> None:
         self._tally = tally
-        self.tracker = ObstacleTracker(params, "map")
+        self.tracker = Tracker(Parameters({}, "tracker"))
         self._since_s: Dict[int, float] = {}
         self._found: Dict[int, bool] = {}
         self._false: set = set()
@@ -97,8 +97,8 @@ class Trial(FlightObserver):
         self._tally.cost_us.append(1e6 * (time.perf_counter() - start_s))
         self._tally.scans += 1
         states, radii_m = self._truth(scan.stamp_s)
-        self._compare(self.tracker.tracks, self.tracker.unseen_s, states, radii_m)
-        self._watch(scan, map_from_lidar, self.tracker.tracks, states, radii_m)
+        self._compare(self.tracker.known, self.tracker.known.unseen_s, states, radii_m)
+        self._watch(scan, map_from_lidar, self.tracker.known, states, radii_m)
 
     def _truth(self, now_s: float) -> Tuple[Floats, Floats]:
         """Return states float64[m, 4] and radii of what moves but the robot itself."""
@@ -143,14 +143,14 @@ class Trial(FlightObserver):
         self, scan: Scan, pose: Pose3D, tracks: Tracks, states: Floats, radii_m: Floats
     ) -> None:
         """Count the obstacles in view that have a track, and the time until it is confirmed."""
-        near_m = np.where(scan.ranges_m < PARAMS.range_m, scan.ranges_m, np.nan)
+        near_m = np.where(scan.ranges_m < self.tracker.params.range_m, scan.ranges_m, np.nan)
         angles = scan.angle_min_rad + scan.angle_increment_rad * np.arange(len(near_m))
         flat = np.column_stack([near_m * np.cos(angles), near_m * np.sin(angles), 0.0 * near_m])
         points = pose.transform_points(flat)[:, :2]
         for k, (state, radius_m) in enumerate(zip(states, radii_m)):
             hits = int((np.hypot(*(points - state[:2]).T) < radius_m + 0.05).sum())
             speed_mps = math.hypot(state[2], state[3])
-            if hits < VIEW_BEAMS or speed_mps < MOVES * PARAMS.min_speed_mps:
+            if hits < VIEW_BEAMS or speed_mps < MOVES * self.tracker.params.min_speed_mps:
                 self._since_s.pop(k, None)
                 continue
             if k not in self._since_s:

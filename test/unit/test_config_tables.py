@@ -28,7 +28,6 @@ from quad_nav.config.tables.recoveries import (
 )
 from quad_nav.config.tables.trajectory_planner import TRAJECTORY_PLANNER_TABLE
 from quad_nav.control.dwa_planner import DwaParams
-from quad_nav.control.surroundings import EvasionParams
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layered import CostmapParams
@@ -44,14 +43,13 @@ from quad_nav.plan.carrot import CarrotParams
 from quad_nav.plan.global_planner import SearchPlannerParams
 from quad_nav.plan.navfn import NavfnParams
 from quad_nav.recovery import ClearCostmapParams, MoveSlowAndClearParams, RotateParams
-from quad_nav.tracking.tracks import TrackerParams
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "parameters.md"
 
 ROTATE = Table(fixed=ROTATE_TABLE.fixed + ROTATE_FROM_PLANNER)
 # (dataclass, table, fields that are read in another way than from one row)
 PAIRS = [
-    (NavigatorParams, MOVE_BASE_TABLE, {"recovery_behaviors", "progress", "evasion"}),
+    (NavigatorParams, MOVE_BASE_TABLE, {"recovery_behaviors", "progress"}),
     (TrajectoryPlannerParams, TRAJECTORY_PLANNER_TABLE, set()),
     (NavfnParams, NAVFN_TABLE, set()),
     (SearchPlannerParams, GLOBAL_PLANNER_TABLE, set()),
@@ -84,11 +82,9 @@ SWITCH_OWNERS = [
     ObstacleLayerParams,
     PeerParams,
     ProgressParams,
-    EvasionParams,
     RotateParams,
     ScanValidatorParams,
     StaticLayerParams,
-    TrackerParams,
     TrajectoryPlannerParams,
     VoxelLayerParams,
 ]

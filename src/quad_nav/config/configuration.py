@@ -7,6 +7,14 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 
 from quad_nav.config.costmaps import costmap_params, normalise_costmap, remark_on_blindness
+from quad_nav.config.filters import (
+    COMMAND_FILTERS,
+    SCAN_FILTERS,
+    FilterType,
+    filter_names,
+    filters_of,
+    normalise_filters,
+)
 from quad_nav.config.fixes import FIXES, FIXES_TABLE, with_fixes
 from quad_nav.config.notes import CAUTION, MAPPED, OTHER_ROBOT, Notes, Remark, join
 from quad_nav.config.planners import (
@@ -29,14 +37,12 @@ from quad_nav.config.recoveries import (
 )
 from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
 from quad_nav.config.workload import rollout_problem, size_problem
-from quad_nav.control.surroundings import EvasionParams
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.errors import InputError
 from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.params import NavigatorParams
 from quad_nav.peers.coordinator import PeerParams
-from quad_nav.tracking.tracks import TrackerParams
 
 COSTMAPS = ("global_costmap", "local_costmap")
 # Costmaps look for these upwards too, to the node's level.
@@ -51,6 +57,8 @@ class Configuration:
         global_planner: Parameters of the planner that ``navigator`` names: its dataclass, or a
             ``Plugin`` of the user's. The same holds for ``local_planner``.
         recoveries: (name, parameters) in the order in which they are tried.
+        scan_filters: (name, type) in their order.
+        command_filters: The same.
         local_planner_period_s: Control period that rollouts assume; as in move_base it may differ
             from the period of the control loop.
         clearing_radius_m: Half the side of the square that ``make_plan`` clears around the robot.
@@ -65,12 +73,13 @@ class Configuration:
     navigator: NavigatorParams
     peers: PeerParams
     scan_validator: ScanValidatorParams
-    tracker: TrackerParams
     global_costmap: CostmapParams
     local_costmap: CostmapParams
     global_planner: Any
     local_planner: Any
     recoveries: Tuple[Tuple[str, RecoveryParams], ...]
+    scan_filters: Tuple[Tuple[str, FilterType], ...]
+    command_filters: Tuple[Tuple[str, FilterType], ...]
     local_planner_period_s: float
     clearing_radius_m: float
     body_radius_m: Optional[float] = None
@@ -148,12 +157,13 @@ def _made(
         navigator=navigator_params(tree, listed, given),
         peers=with_fixes(PeerParams(), tree),
         scan_validator=with_fixes(ScanValidatorParams(), tree),
-        tracker=with_fixes(TrackerParams(), tree),
         global_costmap=costmap_params(tree, "global_costmap"),
         local_costmap=costmap_params(tree, "local_costmap"),
         global_planner=planner_params(tree, "base_global_planner"),
         local_planner=planner_params(tree, "base_local_planner"),
         recoveries=recoveries(tree, listed),
+        scan_filters=filters_of(tree, SCAN_FILTERS),
+        command_filters=filters_of(tree, COMMAND_FILTERS),
         local_planner_period_s=local_planner_period_s(tree),
         clearing_radius_m=tree.get("clearing_radius", circumscribed_radius_m(tree)),
         body_radius_m=tree.get("body_radius"),
@@ -177,7 +187,6 @@ def navigator_params(
     params = NavigatorParams(
         recovery_behaviors=listed,
         progress=with_fixes(ProgressParams(), tree),
-        evasion=with_fixes(EvasionParams(), tree),
         **fields(tree, MOVE_BASE_TABLE.parameters, given),
     )
     return with_fixes(params, tree)
@@ -194,9 +203,11 @@ def _normalise(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
         *_INHERITED,
         "recovery_behaviors",
         *listed_names(tree),
+        *filter_names(tree),
     ]
     normalise(tree, "", MOVE_BASE_TABLE, notes, also_known=known)
     normalise_planners(tree, notes)
+    normalise_filters(tree, notes)
     normalise(subtree(tree, FIXES, "", notes), FIXES, FIXES_TABLE, notes)
     for name in COSTMAPS:
         normalise_costmap(tree, name, notes)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, Mapping, Tuple, TypeVar, cast
 
-from quad_nav.config.moving_obstacles import MOVING_OBSTACLES, Switch
 from quad_nav.config.reader import fields
 from quad_nav.config.spec import RESTORE_DEFAULTS, Parameter, Table, double, flag
 from quad_nav.control.dwa_planner_params import DwaParams
@@ -27,6 +26,8 @@ from quad_nav.recovery import ClearCostmapParams, MoveSlowAndClearParams, Rotate
 FIXES = "fixes"  # the name of the group below the node's own namespace
 
 _Params = TypeVar("_Params")
+Switch = Tuple[Parameter, Tuple[type, ...]]
+"""A parameter of the group and the dataclasses that own it."""
 
 # The switches in the order of dynamic_reconfigure, each with the dataclasses that own it.
 _SWITCHES: Tuple[Switch, ...] = (
@@ -332,7 +333,6 @@ _SWITCHES: Tuple[Switch, ...] = (
         ),
         (VoxelLayerParams,),
     ),
-    *MOVING_OBSTACLES,
 )
 
 FIXES_TABLE = Table(

@@ -147,11 +147,9 @@ def _with_other_fixes(configuration: Configuration) -> Configuration:
         navigator=replace(
             with_fixes(navigator, tree),
             progress=with_fixes(navigator.progress, tree),
-            evasion=with_fixes(navigator.evasion, tree),
         ),
         peers=with_fixes(configuration.peers, tree),
         scan_validator=with_fixes(configuration.scan_validator, tree),
-        tracker=with_fixes(configuration.tracker, tree),
         local_planner=with_fixes(configuration.local_planner, tree),
         global_costmap=costmap_params(tree, "global_costmap"),
         local_costmap=costmap_params(tree, "local_costmap"),

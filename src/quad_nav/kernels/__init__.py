@@ -9,7 +9,6 @@ Reading order: ``jit``, ``library`` and ``build_library`` (compiled kernels with
 ``projection``, ``observations``, ``raytrace`` with ``obstructed_cells``, ``voxels``, ``inflation``
 (``costmap``);
 ``wave``, ``descent``, ``global_planner`` (``plan``); ``collision``, ``map_grid``, ``rollout``,
-``dwa``, ``space_time``, ``standing_obstacles``, ``body_response``, ``evasion_commands``,
-``passive_safety`` (``control``); ``peers``;
+``dwa`` (``control``); ``peers``;
 ``flight_law``, ``rigid_body``, ``rays``, ``sectors``, ``lidar``, ``rectangles`` (``sim``).
 """

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Optional, Tuple
 
-from quad_nav.control.surroundings import EvasionParams
 from quad_nav.navigator.control_supervisor import ProgressParams
 
 
@@ -29,7 +28,6 @@ class NavigatorParams:
         plan_inside_map: Plans keep the robot off the edge of a global costmap that does not roll;
             False restores upstream behaviour, whose plans may lead along the edge.
         progress: Detection of a robot that makes no progress.
-        evasion: Evasion of moving obstacles.
     """
 
     base_global_planner: str = "navfn/NavfnROS"
@@ -54,4 +52,3 @@ class NavigatorParams:
     stop_while_planning: bool = True
     plan_inside_map: bool = True
     progress: ProgressParams = ProgressParams()
-    evasion: EvasionParams = EvasionParams()

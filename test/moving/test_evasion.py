@@ -1,0 +1,220 @@
+"""Evasion: which command replaces one that leads into a moving obstacle, by hand-made numbers."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from quad_moving.evasion import (
+    BODY,
+    LIMITED_BY,
+    Evasion,
+    EvasionParams,
+    places,
+    polar_grid,
+    usual_speed_mps,
+)
+from quad_moving.first_contact import Body, Standing, first_contacts
+from quad_nav.config.plugins import Parameters
+from quad_nav.control.dwa_planner_params import DwaParams
+from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.costmap.tracks import Tracks
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.grid import LETHAL, GridSpec
+from quad_nav.navigator.command_filter import Command, Situation, StopReason
+
+HERE = Pose2D(0.0, 0.0)
+AHEAD = Twist2D(vx_mps=0.5)
+HOVER = Command(Twist2D(), StopReason.IDLE)
+PLANNER = TrajectoryPlannerParams(holonomic_robot=True, max_vel_x_mps=0.5)
+PLAIN = {"max_speed": 1.0, "horizon": 3.0, "max_acceleration": 0.0}
+PEOPLE = {"max_speed": 1.0, "horizon": 0.0, "max_acceleration": 6.0}
+SPEC = GridSpec(160, 160, 0.05, -4.0, -4.0)
+
+
+def tracks(*states, suspects=()):
+    n = len(states)
+    return Tracks(
+        10.0,
+        np.arange(n),
+        np.array(states, float).reshape(n, 4),
+        np.zeros((n, 4, 4)),
+        np.full(n, 0.25),
+        np.zeros(n),
+        np.array(suspects, float).reshape(-1, 5),
+    )
+
+
+def situation(seen, pose=HERE, velocity=None, costs=None, now_s=10.0):
+    costs = np.zeros(SPEC.shape, np.uint8) if costs is None else costs
+    costmap = SimpleNamespace(spec=SPEC, costs=costs, inscribed_radius_m=0.35)
+    velocity = velocity or Twist2D()
+    return Situation(
+        now_s, 0.1, pose, pose, HERE, velocity, velocity, None, costmap, PLANNER, seen, None
+    )
+
+
+def evade(command, seen, params=None, **around):
+    params = PLAIN if params is None else params
+    return Evasion(Parameters(params, "evasion")).filter(command, situation(seen, **around))
+
+
+def contact_s(
+    command, disc, velocity=(0.0, 0.0), hold=30, walk_m=math.inf, standing=None, still_mps=0.05
+):
+    """The first contact of a robot that follows a command at once, steps of 0.1 s."""
+    discs = np.tile(np.array(disc, float), (31, 1, 1))
+    standing = standing or Standing(np.zeros((1, 1), np.uint8), 0.0, 0.0, 1.0, 253)
+    found, body = np.empty(1), Body(1e3, 1e3, still_mps)
+    walks = np.full((31, 1), walk_m)
+    commands = np.array([command], float)
+    first_contacts(body, standing, discs, walks, np.array(velocity), commands, hold, 0.1, found)
+    return found[0]
+
+
+def test_the_time_of_a_contact():
+    """At 1 m/s a disc of 0.5 m around (1.45, 0) begins after 0.95 s."""
+    assert contact_s([1.0, 0.0], [1.45, 0.0, 0.5], (1.0, 0.0)) == pytest.approx(1.0)
+    assert contact_s([0.0, 1.0], [1.45, 0.0, 0.5], (0.0, 1.0)) == math.inf
+
+
+def test_a_robot_at_rest_may_be_touched():
+    assert contact_s([0.0, 0.0], [0.2, 0.0, 0.5]) == math.inf
+
+
+def test_a_robot_that_brakes_in_time_is_clear():
+    """It follows the command for 0.5 s, and stands at 0.55 m at the latest."""
+    assert contact_s([1.0, 0.0], [1.2, 0.0, 0.5], (1.0, 0.0), hold=5) == math.inf
+    assert contact_s([1.0, 0.0], [0.9, 0.0, 0.5], (1.0, 0.0), hold=5) == pytest.approx(0.5)
+
+
+def test_nobody_is_farther_than_a_walk():
+    assert contact_s([1.0, 0.0], [1.0, 0.0, 0.5], (1.0, 0.0), walk_m=0.3) == pytest.approx(0.8)
+
+
+def test_a_robot_may_fly_away_from_what_it_touches():
+    assert contact_s([-1.0, 0.0], [0.3, 0.0, 0.5], (-1.0, 0.0)) == math.inf
+    assert contact_s([1.0, 0.0], [0.3, 0.0, 0.5], (1.0, 0.0)) < math.inf
+
+
+def test_a_command_into_what_stands_is_none():
+    wall = Standing(np.array([[0, 254]], np.uint8), -0.5, -0.5, 1.0, 253)  # from x = 0.5 m on
+    assert contact_s([1.0, 0.0], [9.0, 9.0, 0.5], (1.0, 0.0), standing=wall) == -1.0
+    assert contact_s([-1.0, 0.0], [9.0, 9.0, 0.5], (-1.0, 0.0), standing=wall) == math.inf
+
+
+def test_where_obstacles_can_be():
+    """After 0.5 s 6 m/s^2 is 0.75 m, and a walk of 1.6 m/s is 0.8 m."""
+    seen = tracks([2.0, 0.0, -0.8, 0.0], suspects=[[1.0, 1.0, 0.0, 0.0, 0.3]])
+    times_s = np.array([0.0, 0.5])
+    discs, walks = places(EvasionParams(max_acceleration_mps2=6.0), seen, HERE, 0.45, times_s)
+    np.testing.assert_allclose(discs[1], [[1.6, 0.0, 0.7 + 0.75], [1.0, 1.0, 0.75 + 0.75]])
+    np.testing.assert_allclose(walks, [[0.7, 0.75], [0.7 + 0.8, 0.75 + 0.8]])
+    discs, _ = places(EvasionParams(max_acceleration_mps2=0.0), seen, HERE, 0.45, times_s)
+    np.testing.assert_allclose(discs[1, :, 2], [0.7, 0.75])
+
+
+def test_the_grid_has_the_hover_and_all_courses():
+    grid = polar_grid(2.0)
+    assert grid.shape == (1 + 6 * 32, 2)
+    assert grid[0].tolist() == [0.0, 0.0] and np.hypot(*grid.T).max() == pytest.approx(2.0)
+
+
+def test_nothing_that_moves_leaves_the_command_as_it_is():
+    command = Command(AHEAD)
+    assert evade(command, tracks()) is command
+    assert evade(command, None) is command
+
+
+def test_an_obstacle_that_passes_leaves_the_command_as_it_is():
+    command = Command(AHEAD)
+    assert evade(command, tracks([3.0, 2.5, -1.0, 0.0])) is command
+
+
+def test_a_hovering_robot_evades_to_the_nearer_side():
+    found = evade(HOVER, tracks([2.0, 0.2, -1.0, 0.0]))
+    assert found.velocity.vy_mps < -0.2 and found.stop is None
+    assert found.limited_by == LIMITED_BY
+
+
+def test_commands_are_in_the_robots_frame():
+    turned = Pose2D(0.0, 0.0, math.pi / 2)
+    found = evade(HOVER, tracks([2.0, 0.2, -1.0, 0.0]), pose=turned)
+    assert found.velocity.vx_mps < -0.2
+
+
+def test_a_wall_closes_a_side():
+    costs = np.zeros(SPEC.shape, np.uint8)
+    costs[:78] = LETHAL  # y below -0.1 m
+    coming = tracks([2.0, 0.2, -1.0, 0.0])
+    found = evade(HOVER, coming, {**PLAIN, "max_speed": 2.0}, costs=costs)
+    assert found.velocity.vy_mps > -0.05 and not found.velocity.is_zero
+
+
+def test_where_no_velocity_is_clear_the_contact_comes_as_late_as_possible():
+    """In a corridor something comes faster than the robot can fly back."""
+    costs = np.zeros(SPEC.shape, np.uint8)
+    costs[:74] = costs[86:] = LETHAL  # y beyond 0.3 m
+    found = evade(
+        Command(AHEAD), tracks([2.0, 0.0, -1.5, 0.0]), {**PLAIN, "max_speed": 0.5}, costs=costs
+    )
+    assert found.velocity.vx_mps < -0.3
+
+
+def test_a_robot_without_a_goal_returns_to_its_point():
+    evasion = Evasion(Parameters(PLAIN, "evasion"))
+    evasion.filter(HOVER, situation(tracks([2.0, 0.2, -1.0, 0.0])))
+    back = evasion.filter(HOVER, situation(tracks(), Pose2D(0.0, -0.6)))
+    assert back.velocity.vy_mps == pytest.approx(0.5) and back.limited_by
+    assert evasion.filter(HOVER, situation(tracks(), Pose2D(0.0, -0.1))) is HOVER
+
+
+def test_a_robot_that_is_fast_from_an_evasion_brakes_before_a_wall():
+    costs = np.zeros(SPEC.shape, np.uint8)
+    costs[:, 92:] = LETHAL  # x above 0.6 m
+    evasion = Evasion(Parameters({**PLAIN, "max_speed": 2.0}, "evasion"))
+    evasion.filter(Command(AHEAD), situation(tracks([-1.0, 0.0, 1.5, 0.0])))
+    fast = situation(tracks(), velocity=Twist2D(vx_mps=1.5), costs=costs)
+    assert evasion.filter(Command(AHEAD), fast).velocity.vx_mps <= 0.0
+
+
+def test_a_robot_among_people_stands_while_somebody_can_reach_it():
+    command = Command(AHEAD)
+    near, far = tracks([1.1, 0.0, -1.0, 0.0]), tracks([3.5, 0.0, -1.0, 0.0])
+    assert evade(command, near, PEOPLE, velocity=AHEAD).velocity.vx_mps <= 0.0
+    assert evade(command, far, PEOPLE) is command
+    assert evade(HOVER, near, PEOPLE) is HOVER
+
+
+def test_a_robot_among_people_that_cannot_rest_in_time_brakes():
+    found = evade(
+        Command(AHEAD), tracks([1.0, 0.0, -1.2, 0.0]), PEOPLE, velocity=Twist2D(1.0, -0.3)
+    )
+    assert (found.velocity.vx_mps, found.velocity.vy_mps) == (-1.0, 0.3)
+
+
+def test_who_has_stopped_may_walk_on():
+    stands = tracks(suspects=[[0.9, 0.0, 0.0, 0.0, 0.25]])
+    assert evade(Command(AHEAD), stands, PEOPLE, velocity=AHEAD).velocity.vx_mps <= 0.0
+
+
+@pytest.mark.parametrize(
+    "params, speed_mps",
+    [
+        (PLANNER, 0.5),
+        (TrajectoryPlannerParams(holonomic_robot=False), None),
+        (DwaParams(max_vel_y_mps=0.1, max_vel_trans_mps=0.4), 0.4),
+        (DwaParams(max_vel_y_mps=0.1, max_vel_trans_mps=-1.0, max_vel_x_mps=0.3), 0.3),
+        (DwaParams(max_vel_y_mps=0.0), None),
+        (None, None),
+    ],
+)
+def test_a_robot_that_cannot_fly_sideways_is_left_alone(params, speed_mps):
+    assert usual_speed_mps(params) == speed_mps
+
+
+def test_the_body_is_that_of_the_simulator():
+    assert BODY.gain_per_s == 25.0 / 8.0 and BODY.acceleration_mps2 == 2.0
