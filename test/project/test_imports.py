@@ -23,7 +23,6 @@ LAYERS = [
     {"__init__"},  # quad_nav.__version__
     {"geometry", "grid", "files", "parameter"},
     {"footprint", "timing"},
-    {"tracking"},
     {"costmap", "sim"},
     {"plan", "control"},
     {"recovery", "peers"},
@@ -135,6 +134,7 @@ def test_module_imports_only_what_it_may(path):
         ("quad_nav/mission/summary.py", "from geometry_msgs.msg import Pose"),
         ("quad_nav/sim/lidar.py", "import pybullet as p"),
         ("quad_nav/plan/wavefront_kernel.py", "from numba import njit"),
+        ("quad_nav/navigator/navigator.py", "from quad_moving import Tracker"),
     ],
 )
 def test_rules_refuse(module, statement):

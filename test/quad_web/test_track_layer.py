@@ -30,7 +30,7 @@ def setup_of(time_limit_s: float):
     options = FlightOptions(
         ROOT / "scenes" / "arena.yaml",
         ROOT / "goals",
-        parameters=(("moving_obstacles/track_moving_obstacles", True),),
+        parameters=(("scan_filters", [{"name": "tracker", "type": "quad_moving/Tracker"}]),),
         time_limit_s=time_limit_s,
     )
     setup = read_setup(options)
@@ -64,8 +64,9 @@ def test_a_page_shows_the_tracks_of_a_flight_and_drops_those_that_have_ended(pro
     )  # the walker has stopped at 6 s
 
 
-def test_a_recording_has_the_tracks_of_any_time(tmp_path):
-    path = tmp_path / "flight.bag"
+@pytest.mark.parametrize("suffix", [".bag", ".mcap"])
+def test_a_recording_has_the_tracks_of_any_time(tmp_path, suffix):
+    path = tmp_path / f"flight{suffix}"
     fly(setup_of(9.0), [Recorder(path)])
     flight = RecordedFlight(path)
 

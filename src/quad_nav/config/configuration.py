@@ -12,6 +12,14 @@ from quad_nav.config.costmaps import (
     normalise_costmap,
     remark_on_blindness,
 )
+from quad_nav.config.filters import (
+    COMMAND_FILTERS,
+    SCAN_FILTERS,
+    FilterType,
+    filter_names,
+    filters_of,
+    normalise_filters,
+)
 from quad_nav.config.fixes import GROUPS, normalise_groups, own_params, with_fixes
 from quad_nav.config.layers import LAYERS, SOURCE_TABLE, source_names
 from quad_nav.config.notes import CAUTION, MAPPED, OTHER_ROBOT, Notes, Remark, join
@@ -38,7 +46,6 @@ from quad_nav.config.recoveries import (
     recoveries,
 )
 from quad_nav.config.workload import rollout_problem, size_problem
-from quad_nav.control.surroundings import EvasionParams
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.errors import InputError
@@ -46,7 +53,6 @@ from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.params import NavigatorParams
 from quad_nav.parameter import POSITIVE, fixed_flag, fixed_number, fixed_whole
 from quad_nav.peers.peer_params import PeerParams
-from quad_nav.tracking.tracks import TrackerParams
 
 COSTMAPS = ("global_costmap", "local_costmap")
 # Costmaps look for these upwards too, to the node's level.
@@ -61,6 +67,8 @@ class Configuration:
         global_planner: Parameters of the planner that ``navigator`` names: its dataclass, or a
             ``Plugin`` of the user's. The same holds for ``local_planner``.
         recoveries: (name, parameters) in the order in which they are tried.
+        scan_filters: (name, type) in their order.
+        command_filters: The same.
         local_planner_period_s: Control period that rollouts assume; as in move_base it may differ
             from the period of the control loop.
         body_radius_m: None for a quadcopter's own.
@@ -74,12 +82,13 @@ class Configuration:
     navigator: NavigatorParams
     peers: PeerParams
     scan_validator: ScanValidatorParams
-    tracker: TrackerParams
     global_costmap: CostmapParams
     local_costmap: CostmapParams
     global_planner: Any
     local_planner: Any
     recoveries: Tuple[Tuple[str, RecoveryParams], ...]
+    scan_filters: Tuple[Tuple[str, FilterType], ...]
+    command_filters: Tuple[Tuple[str, FilterType], ...]
     local_planner_period_s: float
     clearing_radius_m: float = fixed_number(
         "clearing_radius", None, "metres", "Half the side of the square that make_plan clears."
@@ -209,6 +218,8 @@ def _made(
         global_planner=planner_params(tree, "base_global_planner"),
         local_planner=planner_params(tree, "base_local_planner"),
         recoveries=recoveries(tree, listed),
+        scan_filters=filters_of(tree, SCAN_FILTERS),
+        command_filters=filters_of(tree, COMMAND_FILTERS),
         local_planner_period_s=local_planner_period_s(tree),
         clearing_radius_m=tree.get("clearing_radius", circumscribed_radius_m(tree)),
         tree=pruned,
@@ -232,7 +243,6 @@ def navigator_params(
         given,
         recovery_behaviors=listed,
         progress=own_params(ProgressParams, tree),
-        evasion=own_params(EvasionParams, tree, "moving_obstacles"),
     )
     return with_fixes(params, tree)
 
@@ -242,7 +252,6 @@ def own_parts(tree: Mapping[str, Any]) -> Dict[str, Any]:
     return {
         "peers": own_params(PeerParams, tree, "peers"),
         "scan_validator": own_params(ScanValidatorParams, tree),
-        "tracker": own_params(TrackerParams, tree, "moving_obstacles"),
     }
 
 
@@ -257,10 +266,12 @@ def _normalise(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
         *_INHERITED,
         "recovery_behaviors",
         *listed_names(tree),
+        *filter_names(tree),
     ]
     normalise(tree, "", MOVE_BASE_TABLE, notes, also_known=known)
     normalise_planners(tree, notes)
     normalise_groups(tree, notes)
+    normalise_filters(tree, notes)
     for name in COSTMAPS:
         normalise_costmap(tree, name, notes)
     return normalise_recoveries(tree, notes)

@@ -12,13 +12,11 @@ from typing import Any, Dict, Mapping, Type, TypeVar
 from quad_nav.config.notes import UNKNOWN, Notes, join
 from quad_nav.config.plugins import plugin_name
 from quad_nav.config.reader import Namespace, Table, made, normalise, subtree
-from quad_nav.control.surroundings import EvasionParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.params import DEFAULT_LOCAL_PLANNER, NavigatorParams
 from quad_nav.parameter import as_upstream, flag, parameters_of
 from quad_nav.peers.peer_params import PeerParams
-from quad_nav.tracking.tracks import TrackerParams
 
 FIXES = "fixes"
 _Params = TypeVar("_Params")
@@ -37,7 +35,6 @@ def _group(*owners: type) -> Table:
 
 GROUPS: Dict[str, Table] = {
     "peers": _group(PeerParams),
-    "moving_obstacles": _group(TrackerParams, EvasionParams),
     FIXES: _group(FixesParams),
 }
 """Name of each group below the node's own namespace -> its parameters."""
@@ -45,7 +42,7 @@ GROUPS: Dict[str, Table] = {
 # Parameters that stood in the group ``fixes`` and are now at the node's level.
 _OF_NODE = (NavigatorParams, ProgressParams, ScanValidatorParams)
 # Words that these had before their names there.
-_OLD_WORDS = {"peers": "peer_", "moving_obstacles": "moving_obstacle_"}
+_OLD_WORDS = {"peers": "peer_"}
 
 
 def normalise_groups(tree: Namespace, notes: Notes) -> None:

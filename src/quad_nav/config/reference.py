@@ -108,11 +108,6 @@ _SECTIONS: Tuple[Tuple[str, str, Table], ...] = (
         GROUPS[FIXES],
     ),
     ("peers", "Our own: see [avoidance between robots](peers.md).", GROUPS["peers"]),
-    (
-        "moving_obstacles",
-        "Our own: see [moving obstacles](moving_obstacles.md).",
-        GROUPS["moving_obstacles"],
-    ),
     ("Costmaps", "In `global_costmap` and `local_costmap`.", COSTMAP_TABLE),
     ("Obstacle layer", "`costmap_2d::ObstacleLayer`.", LAYERS["costmap_2d::ObstacleLayer"]),
     ("Voxel layer", "`costmap_2d::VoxelLayer`.", LAYERS["costmap_2d::VoxelLayer"]),

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.control.moving_discs import MovingDiscs, passing_cost
 from quad_nav.costmap.collision import Triple, footprint_cost
 from quad_nav.costmap.cost_grid_kernel import CostmapView, cell_of
 from quad_nav.files.kernel_cache import njit
@@ -58,7 +57,6 @@ class Obstacles(NamedTuple):
     footprint: NDArray[np.float64]  # [n, 2], robot frame, not scaled
     scale: float  # weight; 0 for no obstacle critic
     sums: bool  # sum costs along the trajectory; else take the highest
-    moving: MovingDiscs  # in the costmap's frame
 
 
 @njit(cache=True, nogil=True)
@@ -293,9 +291,6 @@ def obstacle_cost(
     for k in range(count - 1, -1, -1):
         pose = points[k, 0], points[k, 1], points[k, 2]
         cost = cost_of_pose(obstacles, footprint, pose, 0.0 if obstacles.sums else total)
-        if cost >= 0.0 and obstacles.moving.discs.shape[1] > 0:
-            passing = passing_cost(obstacles.moving, k / count, pose[0], pose[1])
-            cost = passing if passing < 0.0 else max(cost, passing)
         if cost < 0.0:
             return -1.0
         total = total + cost if obstacles.sums else max(total, cost)

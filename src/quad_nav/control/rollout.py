@@ -34,8 +34,6 @@ from numpy.typing import NDArray
 
 from quad_nav.control import rollout_kernel as kernel
 from quad_nav.control.map_grid import cost_cloud, distance_grids
-from quad_nav.control.moving_discs import MovingDiscs
-from quad_nav.control.prediction import NO_DISCS
 from quad_nav.control.sample_motion import RolloutParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.control.velocity_search_kernel import SampleRules, VelocityWindow, search
@@ -85,7 +83,6 @@ class Rollout:
         plan: NDArray[np.float64],
         pose: Pose2D,
         velocity: Twist2D,
-        moving: MovingDiscs = NO_DISCS,
     ) -> None:
         self.spec = spec
         self.pose = Pose2D(*single(pose.x_m, pose.y_m, pose.yaw_rad))
@@ -108,7 +105,6 @@ class Rollout:
             self.grids.path,
             self.grids.goal,
             plan,
-            moving,
         )
         self.kernel_params = _kernel_params(params, spec.resolution_m)
 

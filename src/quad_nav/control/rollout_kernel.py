@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.control.lanes import OFF_MAP, UNCERTAIN
-from quad_nav.control.moving_discs import MovingDiscs, passing_cost
 from quad_nav.control.sample_motion import (
     RolloutParams,
     last_cells,
@@ -41,7 +40,6 @@ class RolloutInputs(NamedTuple):
     path_distance: NDArray[np.int32]  # [H, W]
     goal_distance: NDArray[np.int32]  # [H, W]
     plan: NDArray[np.float64]  # [m, 2 or more], columns x, y, m >= 1
-    moving: MovingDiscs  # in the costmap's frame
 
 
 @njit(cache=True, nogil=True)
@@ -79,7 +77,6 @@ def simulate(
             return COLLIDES, k
         if with_footprint:
             occupancy = _occupancy(inputs, x, y, theta, cell_x, cell_y, occupancy)
-            occupancy = _occupancy_in_time(inputs, k / steps, x, y, occupancy)
             if occupancy < 0.0:
                 return COLLIDES, k
         if params.simple_attractor:
@@ -123,25 +120,6 @@ def _occupancy(
     if cost < 0.0:
         return COLLIDES
     return max(occupancy, cost, float(inputs.costmap.costs[cell_y, cell_x]))
-
-
-@njit(cache=True, nogil=True)
-def _occupancy_in_time(
-    inputs: RolloutInputs, share: float, x: float, y: float, occupancy: float
-) -> float:
-    """Return the higher of an occupancy and that of what moves; COLLIDES where either does.
-
-    Args:
-        inputs: Costmap, footprint and plan.
-        share: Share of the rollout's time that has passed.
-        x: Position.
-        y: Position.
-        occupancy: Occupancy so far, or COLLIDES.
-    """
-    if inputs.moving.discs.shape[1] == 0 or occupancy < 0.0:
-        return occupancy
-    cost = passing_cost(inputs.moving, share, x, y)
-    return COLLIDES if cost < 0.0 else max(occupancy, cost)
 
 
 @njit(cache=True, nogil=True)
@@ -374,7 +352,6 @@ def cost_up_to(
         known = occupancy
         if k > 0:
             occupancy = _occupancy(inputs, x, y, theta, cell_x, cell_y, occupancy)
-        occupancy = _occupancy_in_time(inputs, k / steps, x, y, occupancy)
         if occupancy == known:
             continue
         if occupancy < 0.0 or _cost_of_end(inputs, params, last_x, last_y, occupancy) > limit:

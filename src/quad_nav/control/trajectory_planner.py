@@ -123,7 +123,6 @@ class TrajectoryPlanner(PlanFollower):
             self.local_global_plan,
             pose,
             velocity,
-            self.moving,
         )
         self.best = choose_trajectory(
             self.rollout, self.params, self.oscillation, self.control_period_s

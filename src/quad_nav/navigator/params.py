@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Optional, Tuple
 
-from quad_nav.control.surroundings import EvasionParams
 from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.parameter import deviation, flag, number, positive, text, whole
 
@@ -28,7 +27,6 @@ class NavigatorParams:
         stop_while_planning: A robot without a plan stops; False restores upstream behaviour,
             which leaves the last command in force.
         progress: Detection of a robot that makes no progress.
-        evasion: Evasion of moving obstacles.
     """
 
     base_global_planner: str = text(
@@ -86,7 +84,6 @@ class NavigatorParams:
         "plan_inside_map", True, "Plans keep a radius from the edge of the map.", upstream=False
     )
     progress: ProgressParams = ProgressParams()
-    evasion: EvasionParams = EvasionParams()
 
     recovery_behaviors: Optional[Tuple[Tuple[str, str], ...]] = None
 

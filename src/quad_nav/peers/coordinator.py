@@ -1,8 +1,8 @@
 """Coordination of one robot with its peers.
 
-The navigator asks four things: ``observe`` updates the peers, ``decide`` says whether the robot
-yields, ``neighbours`` returns the peers for evasions, ``limit`` keeps a command inside the robot's
-Voronoi cell. A robot without a goal yields by a manoeuvre: to a holding point, and back.
+The navigator asks three things: ``observe`` updates the peers, ``decide`` says whether the robot
+yields, ``limit`` keeps a command inside the robot's Voronoi cell. A robot without a goal yields by
+a manoeuvre: to a holding point, and back.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from typing import List, Optional, Sequence, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.control.neighbours import Neighbours
 from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.peers.peer import (
     IDLE_PRIORITY,
@@ -30,10 +30,9 @@ from quad_nav.peers.peer_tracker import PeerTracker
 from quad_nav.peers.right_of_way import STRANGER, Yield, YieldDecision
 from quad_nav.peers.roundabout import Roundabout
 from quad_nav.peers.stand_off import StandOff
-from quad_nav.peers.voronoi_cell import LimitedCommand, limit_to_cell, neighbours_of
+from quad_nav.peers.voronoi_cell import LimitedCommand, limit_to_cell
 from quad_nav.peers.yielding import YieldRules
 from quad_nav.timing import StallTimer
-from quad_nav.tracking.tracks import Tracks
 
 LATENCY_S = 0.15  # how much later than due the next command may come
 GIVE_UP_PRIORITY_AFTER_S = 15.0  # without progress
@@ -324,19 +323,6 @@ class PeerCoordinator:
             self._cell_peers,
             self._tracker.safety_radius_m,
             control_period_s + LATENCY_S,
-        )
-
-    def neighbours(
-        self, pose: Pose2D, velocity: Twist2D, local_from_map: Pose2D, control_period_s: float
-    ) -> Neighbours:
-        """Return the peers, in the local costmap's frame; other arguments are as for ``limit``."""
-        return neighbours_of(
-            pose,
-            velocity,
-            self._cell_peers,
-            self._tracker.safety_radius_m,
-            control_period_s + LATENCY_S,
-            local_from_map,
         )
 
     @property

@@ -9,9 +9,11 @@ import pytest
 from upstream import UPSTREAM
 
 from quad_nav.config import load
+from quad_nav.costmap.tracks import Tracks
 from quad_nav.errors import NoPath, NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
+from quad_nav.navigator.command_filter import VoronoiCell
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
 from quad_nav.navigator.tick import RobotPoses, State, Trigger
@@ -19,7 +21,6 @@ from quad_nav.peers.coordinator import PeerCoordinator
 from quad_nav.plan.planner import ring_offsets
 from quad_nav.recovery import Step
 from quad_nav.timing import Schedule
-from quad_nav.tracking.tracks import Tracks
 
 HERE = Pose2D(1.0, 1.0, 0.0)
 GOAL = Pose2D(5.0, 1.0, 0.0)
@@ -117,7 +118,7 @@ class Flight:
     It behaves as upstream, or with the parameters of the tree that is given.
     """
 
-    def __init__(self, recoveries=(), tree=UPSTREAM, **params):
+    def __init__(self, recoveries=(), tree=UPSTREAM, filters=None, **params):
         params.setdefault("controller_frequency_hz", 10.0)
         configuration = load(tree)
         self.global_costmap = FakeCostmap(5.0)
@@ -131,6 +132,7 @@ class Flight:
             self.controller,
             recoveries,
             PeerCoordinator(configuration.peers, self.global_costmap, self.local_costmap),
+            [VoronoiCell()] if filters is None else filters,
         )
         self.now_s = 0.0
         self.pose = HERE
@@ -385,9 +387,9 @@ def test_a_changed_frequency_takes_effect_at_once():
     assert len(flight.global_costmap.updates) - before >= 16
 
 
-def test_tracks_without_avoidance_change_no_command():
+def test_tracks_without_a_filter_change_no_command():
     tracks = Tracks(
-        0.0, np.array([0]), np.array([[1.5, 1.0, -1.0, 0.0]]), np.zeros((1, 4, 4)), [0.5]
+        0.0, np.array([0]), np.array([[1.5, 1.0, -1.0, 0.0]]), np.zeros((1, 4, 4)), [0.5], [0.0]
     )
     flight = Flight()
     flight.navigator.set_goal(GOAL, 0.0)

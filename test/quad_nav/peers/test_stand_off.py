@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from quad_nav.config import load
+from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL
 from quad_nav.peers.peer import Peer
 from quad_nav.peers.right_of_way import STRANGER, Yield
 from quad_nav.peers.stand_off import StandOff
 from quad_nav.scenario.assembly import build_navigator
-from quad_nav.tracking.tracks import Tracks
 
 TREE = {
     "global_costmap": {"width": 10.0, "height": 10.0, "robot_radius": 0.35, "resolution": 0.1},

@@ -1,6 +1,6 @@
 """Kalman filters with constant velocity: states x, y, and their velocities.
 
-Mirrors ``tracking/kalman.py``. Written out, because numpy's solvers start threads for four numbers.
+``kalman`` has the reasoning. Written out, because numpy's solvers start threads for four numbers.
 """
 
 from __future__ import annotations

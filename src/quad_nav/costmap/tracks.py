@@ -1,4 +1,4 @@
-"""Tracks of moving obstacles at one time, and the parameters of the tracker."""
+"""Tracks of moving obstacles at one time: what a scan filter tells command filters of them."""
 
 from __future__ import annotations
 
@@ -8,54 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
-from quad_nav.parameter import flag, number
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class TrackerParams:
-    """Parameters of the tracking of moving obstacles, see ``docs/moving_obstacles.md``.
-
-    Attributes:
-        max_acceleration_mps2: Greatest acceleration of an obstacle for passive safety; above 0
-            what may walk on or in is told as well, see ``Tracks.suspects``.
-    """
-
-    track_moving_obstacles: bool = flag(
-        "track_moving_obstacles", False, "Track what moves in the scans of LIDARs.", upstream=False
-    )
-    range_m: float = number("range", 10.0, "metres", 0, 100, "Greatest range of tracked obstacles.")
-    min_speed_mps: float = number(
-        "min_speed", 0.2, "metres/s", 0, 5, "Slower obstacles count as standing."
-    )
-    max_radius_m: float = number(
-        "max_radius", 1.0, "metres", 0, 10, "Larger obstacles count as standing."
-    )
-    acceleration_mps2: float = number(
-        "acceleration", 1.5, "metres/s^2", 0, 20, "Deviation of accelerations."
-    )
-    lost_after_s: float = number(
-        "timeout", 1.5, "seconds", 0, 60, "Hidden obstacles are kept so long."
-    )
-    margin_m: float = number(
-        "margin", 0.12, "metres", 0, 1, "A point moves that is so far in free space."
-    )
-    max_acceleration_mps2: float = number(
-        "max_acceleration", 0.0, "metres/s^2", 0, 100, "Obstacles' greatest; 0: no passive safety."
-    )
 
 
 @dataclass(frozen=True)
 class Tracks:
     """Moving obstacles at one time, as upright discs with a constant velocity.
 
+    They are in the local costmap's frame.
+
     Attributes:
         time_s: Time of the states.
         numbers: int64[n], a number for each obstacle, kept from scan to scan.
-        states: float64[n, 4]: x and y, m, and their velocities, m/s, in one fixed frame.
+        states: float64[n, 4]: x and y, m, and their velocities, m/s.
         covariances: float64[n, 4, 4] of the states.
         radii_m: float64[n], radii of the discs that hold the obstacles.
+        unseen_s: float64[n], times for which the obstacles have not been seen, but predicted.
         suspects: float64[k, 5], rows x, y, vx, vy and radius of what is no track, but may move:
             obstacles that have stopped, and what moves for the first time.
     """
@@ -65,6 +34,7 @@ class Tracks:
     states: Floats
     covariances: Floats
     radii_m: Floats
+    unseen_s: Floats
     suspects: Floats = field(default_factory=lambda: np.empty((0, 5)))
 
     @classmethod
@@ -76,6 +46,7 @@ class Tracks:
             np.empty((0, 4)),
             np.empty((0, 4, 4)),
             np.empty(0),
+            np.empty(0),
         )
 
     def __len__(self) -> int:
@@ -86,21 +57,6 @@ class Tracks:
         """True if there is a track or a suspect."""
         return bool(len(self.numbers) or len(self.suspects))
 
-    @property
-    def position_variances(self) -> Floats:
-        """Mean variances of the positions along x and y, float64[n]."""
-        return self._mean_variances(0)
-
-    @property
-    def velocity_variances(self) -> Floats:
-        """Mean variances of the velocities along x and y, float64[n]."""
-        return self._mean_variances(2)
-
-    def _mean_variances(self, first: int) -> Floats:
-        along_x, along_y = (self.covariances[:, k, k] for k in (first, first + 1))
-        means: Floats = (along_x + along_y) / 2.0
-        return means
-
     def chosen(self, rows: NDArray[np.bool_]) -> Tracks:
         """Return some of the obstacles, bool[n]."""
         return replace(
@@ -109,6 +65,7 @@ class Tracks:
             states=self.states[rows],
             covariances=self.covariances[rows],
             radii_m=self.radii_m[rows],
+            unseen_s=self.unseen_s[rows],
         )
 
     def at(self, time_s: float) -> Tracks:

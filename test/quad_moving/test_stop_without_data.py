@@ -13,7 +13,10 @@ from test_navigator import GOAL, HERE, FakeRecovery, Flight
 from test_tracking_flights import walker
 from upstream import UPSTREAM
 
+from quad_moving.evasion import Evasion
+from quad_nav.config.plugins import Parameters
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Twist2D
 from quad_nav.navigator.recovery_sequence import NamedRecovery
 from quad_nav.navigator.tick import RobotPoses, State
@@ -22,11 +25,9 @@ from quad_nav.peers.peer import Intention, Peer, idle_priority
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.simulation_params import SimulationParams
-from quad_nav.tracking.tracks import Tracks
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 FEW_BEAMS = LidarParams(step_size_rad=2 * np.pi / 128)
-EVADES = {"moving_obstacles": {"track_moving_obstacles": True, "avoid_moving_obstacles": True}}
 BOTH = RobotPoses(HERE, HERE)
 
 # -- the state machine ----------------------------------------------------------------
@@ -35,9 +36,10 @@ BOTH = RobotPoses(HERE, HERE)
 class Threatened(Flight):
     """A robot at (1, 1), one obstacle that comes from (3, 1.1) at 1 m/s, and a peer at (1.9, 1)."""
 
-    def __init__(self, tree=EVADES, **params):
+    def __init__(self, tree=(), **params):
         rotate = NamedRecovery("rotate", FakeRecovery(steps=1000))
-        super().__init__([rotate], tree, planner_patience_s=0.5, **params)
+        evasion = Evasion(Parameters({}, "evasion"))
+        super().__init__([rotate], dict(tree), [evasion], planner_patience_s=0.5, **params)
         self.controller.params = TrajectoryPlannerParams(holonomic_robot=True, max_vel_x_mps=0.5)
         self.threat = True
 
@@ -47,7 +49,12 @@ class Threatened(Flight):
             now_s = self.now_s
             states = np.array([[3.0 - 1e-3 * now_s, 1.1, -1.0, 0.0]])
             tracks = Tracks(
-                now_s, np.array([1]), states, 1e-4 * np.eye(4)[np.newaxis], np.array([0.3])
+                now_s,
+                np.array([1]),
+                states,
+                1e-4 * np.eye(4)[np.newaxis],
+                np.array([0.3]),
+                np.zeros(1),
             )
             peer = Peer("quad1", 1.9, 1.0, -0.2, 0.0, now_s, Intention(idle_priority(1)))
             tracks = tracks if self.threat else Tracks.none(now_s)
@@ -125,7 +132,7 @@ def test_every_command_of_a_robot_without_data_is_zero(does, lose):
     flight.threat = True
     poses, reason = lose(flight)
     ticks = flight.ticks(4.0, poses)
-    assert all(tick.command.is_zero and not tick.evades for tick in ticks if tick.command)
+    assert all(tick.command.is_zero and not tick.limited_by for tick in ticks if tick.command)
     lines = [line for tick in ticks for line in tick.warnings if line.startswith("stopping: ")]
     assert lines and all(reason in line for line in lines)
     periods = np.diff([tick.now_s for tick in ticks if tick.command])
@@ -163,7 +170,7 @@ def test_with_data_again_it_goes_on():
     no_scans(flight)
     flight.ticks(1.0)
     flight.local_costmap.stale = []
-    assert any(tick.evades for tick in flight.ticks(0.2))
+    assert any(tick.limited_by for tick in flight.ticks(0.2))
 
 
 def test_upstream_goes_on_recovering_without_scans():
@@ -172,6 +179,18 @@ def test_upstream_goes_on_recovering_without_scans():
     flight.ticks(2.0)
     no_scans(flight)
     assert Twist2D(vyaw_radps=1.0) in [tick.command for tick in flight.ticks(1.0)]
+
+
+@pytest.mark.parametrize("frequency_hz", [2.0, 20.0])
+def test_an_idle_robot_evades_at_a_changed_frequency(frequency_hz):
+    flight = Threatened()
+    hovers(flight)
+    flight.ticks(1.0)
+    params = replace(flight.navigator.params, controller_frequency_hz=frequency_hz)
+    flight.navigator.set_params(params)
+    ticks = [tick for tick in flight.ticks(3.0) if tick.command]
+    periods = np.diff([tick.now_s for tick in ticks])
+    assert len(ticks) > 5 and periods == pytest.approx(1.0 / frequency_hz)
 
 
 # -- flights --------------------------------------------------------------------------
@@ -187,11 +206,11 @@ class Commands(offline.FlightObserver):
         self.ticks, self.tracks = [], []
 
     def on_start(self, flight):
-        self._tracker = flight.offline_robots[0].tracker
+        self._filters = flight.offline_robots[0].scan_filters
 
     def on_tick(self, robot, tick, located, wall_s):
         self.ticks.append(tick)
-        self.tracks.append((tick.now_s, len(self._tracker.tracks)))
+        self.tracks.append((tick.now_s, len(self._filters.tracks(tick.now_s))))
 
     def moves(self, from_s):
         return [
@@ -225,7 +244,7 @@ def fly(folder, config, goal, fault):
 def test_nothing_moves_a_quadcopter_that_has_lost_its_data(config, goal, fault, tmp_path):
     commands = fly(tmp_path, config, goal, fault(BEGIN_S, 1e9))
     limit_s = BEGIN_S + TIMEOUT_S + CONTROL_PERIOD_S
-    assert any(tick.evades for tick in commands.ticks if tick.now_s < limit_s)
+    assert any(tick.limited_by for tick in commands.ticks if tick.now_s < limit_s)
     assert commands.moves(limit_s) == []
 
 

@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.tracking.kalman_kernel import predict_states, update_state
+from quad_moving.kalman_kernel import predict_states, update_state
 
 Floats = NDArray[np.float64]
 

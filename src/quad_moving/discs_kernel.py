@@ -1,6 +1,6 @@
 """Discs fitted to the near side of obstacles.
 
-Mirrors ``tracking/discs.py``.
+``discs`` has the reasoning.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_moving.earlier_scans import ScanView
 from quad_nav.files.kernel_cache import njit
-from quad_nav.tracking.earlier_scans import ScanView
 
 _ITERATIONS = 6
 _FAR = 1.0  # 1/m^2, of a centre that the points do not tell

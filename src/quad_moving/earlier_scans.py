@@ -1,6 +1,6 @@
 """Points of a scan against earlier scans, and the clusters that they make.
 
-Mirrors ``tracking/moving_points.py``.
+``moving_points`` has the reasoning.
 """
 
 from __future__ import annotations

@@ -24,8 +24,7 @@ from typing import Optional, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.geometry import Pose3D, Scan, angle_difference
-from quad_nav.tracking.earlier_scans import (
+from quad_moving.earlier_scans import (
     Doubts,
     EarlierScans,
     Order,
@@ -34,7 +33,8 @@ from quad_nav.tracking.earlier_scans import (
     find_arrived,
     find_clusters,
 )
-from quad_nav.tracking.tracks import TrackerParams
+from quad_moving.params import number
+from quad_nav.geometry import Pose3D, Scan, angle_difference
 
 Floats = NDArray[np.float64]
 Heights = Tuple[float, float]
@@ -55,6 +55,30 @@ _CORRECTION_M, _CORRECTION_RAD = 0.25, 0.3
 
 
 @dataclass(frozen=True)
+class TrackerParams:
+    """Parameters of ``quad_moving/Tracker``."""
+
+    range_m: float = number(
+        "range", 20.0, "m", 0, 100, "Farthest range at which obstacles are tracked."
+    )
+    min_speed_mps: float = number(
+        "min_speed", 0.2, "m/s", 0, 5, "Slower obstacles count as standing."
+    )
+    max_radius_m: float = number(
+        "max_radius", 1.0, "m", 0, 10, "Larger obstacles count as standing."
+    )
+    acceleration_mps2: float = number(
+        "acceleration", 1.5, "m/s^2", 0, 20, "Standard deviation of the obstacles' accelerations."
+    )
+    lost_after_s: float = number(
+        "timeout", 4.0, "s", 0, 60, "Time for which an obstacle that is hidden is predicted."
+    )
+    margin_m: float = number(
+        "margin", 0.12, "m", 0, 1, "A point moves if it is inside space that was free, by so much."
+    )
+
+
+@dataclass(frozen=True)
 class ScanClusters:
     """Clusters of one scan.
 
@@ -64,8 +88,7 @@ class ScanClusters:
         labels: int32[n], row of each point's cluster, -1 for none.
         rows: int64[m, 4]: first beam, number of beams, number of points in space that was free,
             and 1 if the cluster stands.
-        arrived: bool[m], clusters that stand where an earlier scan saw free space; none without
-            passive safety.
+        arrived: bool[m], clusters that stand where an earlier scan saw free space.
     """
 
     view: ScanView
@@ -168,9 +191,8 @@ class MovingPoints:
         labels, rows = np.empty(count, np.int32), np.empty((count, 4), np.int64)
         found = find_clusters(view, points, evidence, _INCIDENCE_RAD, RANGE_NOISE_M, labels, rows)
         rows, arrived = rows[:found], np.zeros(found, np.bool_)
-        if params.max_acceleration_mps2 > 0.0:
-            earlier, widest_m = self._slots(count), 2.0 * params.max_radius_m
-            find_arrived(view, earlier, self._order, doubts, widest_m, points, rows, arrived)
+        earlier, widest_m = self._slots(count), 2.0 * params.max_radius_m
+        find_arrived(view, earlier, self._order, doubts, widest_m, points, rows, arrived)
         return ScanClusters(view, points, labels, rows, arrived)
 
     def _slots(self, beams: int) -> EarlierScans:

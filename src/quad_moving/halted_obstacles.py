@@ -14,10 +14,9 @@ from typing import List
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.tracking.discs import Outlines, Radius, fit, fit_points
-from quad_nav.tracking.kalman import Filters
-from quad_nav.tracking.moving_points import ScanClusters
-from quad_nav.tracking.tracks import TrackerParams
+from quad_moving.discs import Outlines, Radius, fit, fit_points
+from quad_moving.kalman import Filters
+from quad_moving.moving_points import ScanClusters, TrackerParams
 
 Floats = NDArray[np.float64]
 

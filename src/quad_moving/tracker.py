@@ -21,13 +21,16 @@ from typing import Dict, List, Optional, Set
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_moving.association import assign
+from quad_moving.discs import Outlines, Radius, fit, outlines
+from quad_moving.halted_obstacles import SLOW_MPS, HaltedObstacles
+from quad_moving.kalman import Filters
+from quad_moving.moving_points import Heights, MovingPoints, ScanClusters, TrackerParams
+from quad_moving.params import read
+from quad_nav.config.plugins import Parameters
+from quad_nav.costmap.scan_filter import FilteredScan, ScanFilter, ScanSituation
+from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose3D, Scan
-from quad_nav.tracking.association import assign
-from quad_nav.tracking.discs import Outlines, Radius, fit, outlines
-from quad_nav.tracking.halted_obstacles import SLOW_MPS, HaltedObstacles
-from quad_nav.tracking.kalman import Filters
-from quad_nav.tracking.moving_points import Heights, MovingPoints, ScanClusters
-from quad_nav.tracking.tracks import TrackerParams, Tracks
 
 Floats = NDArray[np.float64]
 
@@ -85,28 +88,50 @@ class TrackedScan:
         return bool(self.moving_beams.any())
 
 
-class ObstacleTracker:
-    """Tracks moving obstacles in the scans of one robot's LIDARs.
+class Tracker(ScanFilter):
+    """Scan filter that tracks moving obstacles in the scans of one robot's LIDARs.
 
     Attributes:
-        params: The parameters; they may change in flight.
-        frame: Name of the fixed frame.
-        tracks: The confirmed tracks, at the time of the last scan; empty ones may be older. Call
-            ``end_unseen`` before, because they end without scans as well.
-        unseen_s: float64[n], times for which each of them has not been seen, but predicted.
+        params: The parameters.
+        known: The confirmed tracks, at the time of the last scan; empty ones may be older. The
+            method ``tracks`` ends those that are too old.
     """
 
-    def __init__(self, params: TrackerParams, frame: str) -> None:
-        """Track nothing yet; poses of scans will be in ``frame``."""
-        self.params = params
-        self.frame = frame
+    def __init__(self, params: Parameters) -> None:
+        """Track nothing yet.
+
+        Raises:
+            InputError: A parameter is unknown or out of range.
+        """
+        self.params = read(TrackerParams, params)
         self._number = 0
         self.reset()
 
-    @property
-    def active_tracks(self) -> Optional[Tracks]:
-        """The confirmed tracks; None if obstacles are not tracked."""
-        return self.tracks if self.params.track_moving_obstacles else None
+    def filter(self, filtered: FilteredScan, situation: ScanSituation) -> FilteredScan:
+        """Return the scan with the beams masked that hit moving obstacles."""
+        if not situation.is_local:
+            return filtered
+        tracked = self.add_scan(
+            situation.sensor,
+            filtered.scan,
+            situation.pose,
+            situation.heights_m,
+            situation.known_circles,
+        )
+        if tracked is None:
+            return filtered
+        masked = filtered.masked
+        if tracked.any_moving:
+            masked = tracked.moving_beams if masked is None else masked | tracked.moving_beams
+        return replace(filtered, masked=masked, vacated=tracked.vacated)
+
+    def tracks(self, now_s: float) -> Tracks:
+        """Return the confirmed tracks, at the time of the last scan.
+
+        They end by the clock, also if no scan comes.
+        """
+        self._end_unseen(now_s)
+        return self.known
 
     def reset(self) -> None:
         """Forget tracks and scans, after the clock has jumped."""
@@ -116,17 +141,17 @@ class ObstacleTracker:
     def _end_all(self, now_s: float) -> None:
         self._lives: List[_Life] = []
         self._filters, self._halted = Filters(), HaltedObstacles()
-        self.tracks, self.unseen_s = Tracks.none(now_s), np.empty(0)
+        self.known = Tracks.none(now_s)
 
-    def end_unseen(self, now_s: float) -> None:
+    def _end_unseen(self, now_s: float) -> None:
         """End the tracks that were not seen for too long, though no scan has come since."""
-        tracks, lost_s = self.tracks, self.params.lost_after_s
+        tracks, lost_s = self.known, self.params.lost_after_s
         silent_s = now_s - tracks.time_s
-        kept = self.unseen_s + silent_s <= lost_s
+        kept = tracks.unseen_s + silent_s <= lost_s
         if not kept.all():
-            self.tracks, self.unseen_s = tracks.chosen(kept), self.unseen_s[kept]
+            self.known = tracks.chosen(kept)
         if silent_s > lost_s and len(tracks.suspects):
-            self.tracks = replace(self.tracks, suspects=tracks.suspects[:0])
+            self.known = replace(self.known, suspects=tracks.suspects[:0])
 
     def add_scan(
         self,
@@ -149,10 +174,6 @@ class ObstacleTracker:
         Returns:
             What the scan shows of moving obstacles, None if nothing moves.
         """
-        if not self.params.track_moving_obstacles:
-            if self._points:
-                self.reset()
-            return None
         moving = self._points.get(sensor)
         if moving is None:
             moving = self._points[sensor] = MovingPoints()
@@ -160,7 +181,7 @@ class ObstacleTracker:
         is_thorough = bool(self._lives) or len(self._halted) > 0
         clusters = moving.compare(scan, frame_from_sensor, heights_m, self.params, is_thorough)
         if clusters is None:
-            if len(self.tracks):
+            if len(self.known):
                 self._end_all(now_s)
             return None
         return self._track(now_s, clusters, known_circles)
@@ -200,20 +221,18 @@ class ObstacleTracker:
         biases_m = np.array([self._lives[k].bias_m for k in told], float)
         covariances[:, 0, 0] += biases_m**2
         covariances[:, 1, 1] += biases_m**2
-        self.tracks = Tracks(
+        self.known = Tracks(
             now_s,
             np.array([self._lives[k].number for k in told], np.int64),
             self._states[told],
             covariances,
             np.array([self._lives[k].radius.outer_m for k in told], float),
+            np.array([now_s - self._lives[k].seen_s for k in told], float),
             self._suspects(),
         )
-        self.unseen_s = np.array([now_s - self._lives[k].seen_s for k in told], float)
 
     def _suspects(self) -> Floats:
         """Return what may move but has no confirmed track, float64[k, 5]."""
-        if self.params.max_acceleration_mps2 <= 0.0:
-            return np.empty((0, 5))
         halted = self._halted.rows
         new = [
             (*state, life.radius.outer_m)
@@ -313,7 +332,7 @@ class ObstacleTracker:
     def _halt(self, track: int, now_s: float) -> None:
         """Follow the obstacle of a track that ends, if it has stopped."""
         life, speed_mps = self._lives[track], math.hypot(*self._states[track, 2:])
-        if self.params.max_acceleration_mps2 > 0.0 and life.is_confirmed and speed_mps < SLOW_MPS:
+        if life.is_confirmed and speed_mps < SLOW_MPS:
             noise = self._filters.covariances[track, :2, :2]
             self._halted.add(self._states[track, :2], noise, life.radius, now_s)
 

@@ -15,9 +15,9 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.tracking.discs_kernel import fit_disc, outline_clusters
-from quad_nav.tracking.earlier_scans import ScanView
-from quad_nav.tracking.moving_points import RANGE_NOISE_M, ScanClusters
+from quad_moving.discs_kernel import fit_disc, outline_clusters
+from quad_moving.earlier_scans import ScanView
+from quad_moving.moving_points import RANGE_NOISE_M, ScanClusters
 
 Floats = NDArray[np.float64]
 

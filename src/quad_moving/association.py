@@ -12,7 +12,7 @@ from typing import List, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.tracking.discs import Outlines
+from quad_moving.discs import Outlines
 
 Floats = NDArray[np.float64]
 
