@@ -79,8 +79,6 @@ def test_upstream_keeps_the_patience_of_the_first_reconfiguration():
         ("progress_timeout", "progress_timeout"),
         ("sensor_timeout", "sensor_timeout"),
         ("respect_meter_scoring", "TrajectoryPlannerROS/respect_meter_scoring"),
-        ("moving_obstacle_range", "moving_obstacles/range"),
-        ("track_moving_obstacles", "moving_obstacles/track_moving_obstacles"),
         ("stop_after_rotation", "fixes/upstream"),
     ],
 )
