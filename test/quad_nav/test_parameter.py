@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
+from quad_nav import parameter
 from quad_nav.config.configuration import MOVE_BASE_TABLE
 from quad_nav.config.costmaps import COSTMAP_TABLE
 from quad_nav.config.fixes import GROUPS
@@ -69,15 +71,15 @@ class Params(Base):
 
 @pytest.mark.parametrize("table", TABLES.values(), ids=TABLES)
 def test_defaults_are_valid(table):
-    for parameter in table.parameters:
-        for value in (parameter.default, parameter.in_force):
+    for one in table.parameters:
+        for value in (one.default, one.in_force):
             if value is not None:
-                assert parameter.clamp(parameter.check(value)) == value, parameter.name
+                assert one.clamp(one.check(value)) == value, one.name
 
 
 @pytest.mark.parametrize("table", TABLES.values(), ids=TABLES)
 def test_names_are_unique_and_described(table):
-    names = [parameter.name for parameter in table.parameters]
+    names = [one.name for one in table.parameters]
     names += [*table.unsupported, *table.ignored]
     assert len(names) == len(set(names))
     assert [one.name for one in table.parameters if not one.description.endswith(".")] in (
@@ -93,15 +95,15 @@ def test_fields_have_the_declared_defaults():
 
 
 def test_what_is_declared_again_stands_where_the_subclass_has_it():
-    names = [parameter.name for parameter in parameters_of(Params)]
+    names = [one.name for one in parameters_of(Params)]
     assert names == ["first", "ours", "last", "late", "count", "once"]
 
 
 def test_own_parameters_come_after_those_of_upstream():
     table = Table((Params,), restores=True)
-    names = [parameter.name for parameter in table.reconfigurable]
+    names = [one.name for one in table.reconfigurable]
     assert names == ["first", "last", "late", "count", "restore_defaults", "ours"]
-    assert [parameter.name for parameter in table.fixed] == ["once"]
+    assert [one.name for one in table.fixed] == ["once"]
 
 
 def test_a_dataclass_is_made_of_its_namespace():
@@ -114,6 +116,18 @@ def test_a_dataclass_is_made_of_its_namespace():
 def test_upstream_is_without_deviations_in_every_part():
     params = as_upstream(Params(ours=2.0))
     assert params == Params(ours=2.0, escapes=False, part=Part(0.0))
+
+
+def test_a_declaration_takes_three_lines_at_most():
+    kinds = {name for name, value in vars(parameter).items() if not name.startswith("_")}
+    long = []
+    for path in Path(parameter.__file__).parent.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            call = node.value if isinstance(node, ast.AnnAssign) else None
+            if isinstance(call, ast.Call) and getattr(call.func, "id", "") in kinds:
+                lines = (node.end_lineno or 0) - node.lineno + 1
+                long += [f"{path.name}:{node.lineno}"] if lines > 3 else []
+    assert long == []
 
 
 def test_reference_page_is_up_to_date():

@@ -1,4 +1,4 @@
-"""move_base's YAML tree to parameters of the core; the only package with ROS spellings.
+"""move_base's YAML tree to dataclasses of the core, checked and complete.
 
     tree = load_files("config/tutorial", {"i": "0"})   # or rospy.get_param("~")
     configuration = load(tree, "/move_base0")          # InputError lists every fault

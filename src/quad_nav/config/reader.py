@@ -43,9 +43,10 @@ class Table:
     def reconfigurable(self) -> Tuple[Parameter, ...]:
         """Parameters that can change in flight: upstream's in its order, then our own."""
         found = [one for one in self._declared() if not one.is_fixed]
+        first = [one for one in found if self.is_own or not one.is_own]
         added = [one for one in found if one.is_own and not self.is_own]
         restore = [RESTORE_DEFAULTS] if self.restores else []
-        return (*(one for one in found if one not in added), *restore, *added)
+        return (*first, *restore, *added)
 
     @property
     def fixed(self) -> Tuple[Parameter, ...]:
