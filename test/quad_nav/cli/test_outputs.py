@@ -137,26 +137,14 @@ def test_a_summary_on_a_full_disk_leaves_nothing(tmp_path):
 @pytest.mark.parametrize(
     "command, option, name",
     [
-        *(
-            ("fly", option, name)
-            for option, name in (
-                ("--json", "x.json"),
-                ("--report", "x.html"),
-                ("--animate", "x.gif"),
-                ("--record", "x.bag"),
-            )
-        ),
+        ("fly", "--json", "x.json"),
+        ("fly", "--report", "x.html"),
+        ("fly", "--animate", "x.gif"),
+        ("fly", "--record", "x.bag"),
         ("barn --worlds w.npz", "--json", "x.json"),
         ("barn --worlds w.npz", "--csv", "x.csv"),
-        *(
-            ("sweep --over TrajectoryPlannerROS/max_vel_x=0.3", option, name)
-            for option, name in (
-                ("--json", "x.json"),
-                ("--csv", "x.csv"),
-                ("--report", "x.html"),
-                ("--pictures", "x"),
-            )
-        ),
+        ("sweep --over TrajectoryPlannerROS/max_vel_x=0.3", "--json", "x.json"),
+        ("sweep --over TrajectoryPlannerROS/max_vel_x=0.3", "--pictures", "x"),
         ("tune", "--output", "x"),
         ("report flight.bag", "--output", "x.html"),
         ("report flight.bag", "--pictures", "x"),

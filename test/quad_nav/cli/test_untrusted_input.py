@@ -146,30 +146,12 @@ def _fly(home):
     goals = home / "goals"
     goals.mkdir()
     (goals / "quad0_goals.json").write_text('{"goals": [[2.1, 1.9]]}')
-    written = {name: home / f"flight.{name}" for name in ("bag", "html", "json", "gif")}
-    result = CliRunner().invoke(
-        main,
-        [
-            "fly",
-            "--robots",
-            "1",
-            "--config",
-            str(home / "mine"),
-            "--scene",
-            str(home / "place.yaml"),
-            "--goals",
-            str(goals),
-            "--record",
-            str(written["bag"]),
-            "--report",
-            str(written["html"]),
-            "--json",
-            str(written["json"]),
-            "--animate",
-            str(written["gif"]),
-            "--quiet",
-        ],
-    )
+    kinds = {"record": "bag", "report": "html", "json": "json", "animate": "gif"}
+    written = {kind: home / f"flight.{kind}" for kind in kinds.values()}
+    given = {"config": home / "mine", "scene": home / "place.yaml", "goals": goals, "robots": 1}
+    given.update({option: written[kind] for option, kind in kinds.items()})
+    words = [word for option, value in given.items() for word in (f"--{option}", str(value))]
+    result = CliRunner().invoke(main, ["fly", "--quiet", *words])
     assert result.exit_code == 0, result.output
     return written
 

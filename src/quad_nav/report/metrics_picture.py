@@ -1,4 +1,4 @@
-"""Pictures that compare flights: their paths, and a panel for each metric."""
+"""Picture that compares flights: a panel for each metric."""
 
 from __future__ import annotations
 
@@ -9,18 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from quad_nav.report.compared_flight import ComparedFlight
-from quad_nav.report.comparison_plot import flight_label, paths_extent
 from quad_nav.report.flight_metrics import FlightMetrics
-from quad_nav.report.scene_drawing import draw_scene
-from quad_nav.report.style import (
-    ALARM,
-    WIDTH_IN,
-    colour,
-    line_style,
-    new_figure,
-    robot_legend,
-)
+from quad_nav.report.style import ALARM, colour, new_figure, robot_legend
 
 Panel = Tuple[str, Callable[[FlightMetrics], Optional[float]]]
 PANELS: Tuple[Panel, ...] = (
@@ -43,7 +33,7 @@ def grouped(flights: Sequence[FlightMetrics]) -> Dict[str, List[FlightMetrics]]:
     return groups
 
 
-def comparison_picture(flights: Sequence[FlightMetrics]) -> Figure:
+def metrics_picture(flights: Sequence[FlightMetrics]) -> Figure:
     """Draw each flight as a dot, and failed flights as red crosses."""
     groups = grouped(flights)
     figure = new_figure(5.2)
@@ -71,25 +61,6 @@ def comparison_picture(flights: Sequence[FlightMetrics]) -> Figure:
             ),
         ],
     )
-    return figure
-
-
-def overlay_picture(flights: Sequence[ComparedFlight], metrics: Sequence[FlightMetrics]) -> Figure:
-    """Draw the paths of all flights over the scene of the first one."""
-    x0, x1, y0, y1 = paths_extent(flights)
-    figure = new_figure((WIDTH_IN - 0.6) * min(max((y1 - y0) / (x1 - x0), 0.3), 1.6) + 0.9)
-    axes = figure.subplots()
-    draw_scene(axes, flights[0].scene)
-    handles = []
-    for number, (flight, flown) in enumerate(zip(flights, metrics)):
-        style = {"color": colour(number), "ls": line_style(number), "lw": 1.6}
-        handles.append(Line2D([], [], label=flight_label(number, flown), **style))
-        for robot in flight.robots:
-            axes.plot(robot.positions_m[:, 0], robot.positions_m[:, 1], zorder=4, **style)
-        for contact in flight.contacts:
-            axes.plot(contact.x_m, contact.y_m, "X", color=ALARM, mec="white", ms=11, zorder=11)
-    axes.set(xlim=(x0, x1), ylim=(y0, y1), xlabel="x (m)", ylabel="y (m)")
-    robot_legend(figure, (), handles, columns=2)
     return figure
 
 
