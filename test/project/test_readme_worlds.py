@@ -1,4 +1,4 @@
-"""The README's own worlds and goals fly as the README has them."""
+"""The worlds and goals of ``docs/scenes.md`` fly as the page has them."""
 
 import json
 import re
@@ -11,8 +11,8 @@ from click.testing import CliRunner
 from quad_nav.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
-COMMANDS = re.findall(r"^\.venv/bin/quad (fly .*goals/examples.*)$", README, re.M)
+PAGE = (ROOT / "docs" / "scenes.md").read_text(encoding="utf-8")
+COMMANDS = re.findall(r"^quad (fly .*goals/examples.*)$", PAGE, re.M)
 
 
 def test_a_scene_a_world_a_map_and_goals_are_shown():

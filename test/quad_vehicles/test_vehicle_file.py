@@ -215,8 +215,9 @@ def test_fault_of_a_crazyflie(change, text):
 def test_the_test_files_and_the_documents_files_load(tmp_path):
     for name in ("two_vehicles", "mixed_vehicles", "two_crazyflies"):
         assert len(load_vehicles(ROOT / f"test/ros/{name}.yaml")) == 2
-    page = (ROOT / "docs/vehicles.md").read_text()
-    blocks = [part.split("```")[0] for part in page.split("```yaml\n")[1:]]
+    names = ("vehicles", "crazyflie", "vehicle_simulation")
+    pages = [(ROOT / f"docs/{name}.md").read_text() for name in names]
+    blocks = [part.split("```")[0] for page in pages for part in page.split("```yaml\n")[1:]]
     assert len(blocks) == 4
     for block in blocks:
         indent = len(block) - len(block.lstrip(" "))

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The README's own worlds and goals fly under ROS as the README has them."""
+"""The worlds and goals of the README and of docs/scenes.md fly under ROS as the pages have them."""
 
 from __future__ import annotations
 
@@ -15,8 +15,16 @@ import rospkg
 import rostest
 
 QUAD = os.path.realpath(rospkg.RosPack().get_path("quad"))
-with open(os.path.join(QUAD, "README.md"), encoding="utf-8") as file:
-    COMMANDS = re.findall(r'^make fly ARGS="(.*goals/examples.*)"$', file.read(), re.M)
+PAGES = ("README.md", os.path.join("docs", "scenes.md"))
+
+
+def commands(page):
+    """Return the arguments of the page's `make fly` with goals of goals/examples."""
+    with open(os.path.join(QUAD, page), encoding="utf-8") as file:
+        return re.findall(r'^make fly ARGS="(.*goals/examples.*)"$', file.read(), re.M)
+
+
+COMMANDS = list(dict.fromkeys(found for page in PAGES for found in commands(page)))
 
 
 def fly(arguments):
@@ -47,8 +55,8 @@ def fly(arguments):
 class ReadmeWorlds(unittest.TestCase):
     def test_a_scene_a_world_a_map_and_goals_fly(self):
         kinds = [re.search(r"scene:=\S+\.(\w+)", command) for command in COMMANDS]
-        self.assertEqual([k.group(1) if k else "" for k in kinds], ["", "yaml", "world", "yaml"])
-        for command in COMMANDS[1:]:  # each has goals of its own
+        self.assertEqual([k.group(1) if k else "" for k in kinds], ["yaml", "world", "yaml"])
+        for command in COMMANDS:  # each has goals of its own
             with self.subTest(command):
                 status, log, summary = fly(command)
                 self.assertEqual(status, 0, log)
