@@ -10,8 +10,7 @@ import pytest
 
 rospy = pytest.importorskip("rospy")
 
-from quad_nav.tracking.tracks import Tracks  # noqa: E402
-
+from quad_nav.costmap.tracks import Tracks  # noqa: E402
 from quad_nav.geometry import Pose3D, quaternion_from_yaw  # noqa: E402
 from quad_nav.ros.common.conversions import marker_array, replacing_markers  # noqa: E402
 from quad_nav.ros.web.layers import TrackIntake  # noqa: E402

@@ -257,21 +257,21 @@ _SWITCHES: Tuple[Switch, ...] = (
     ),
     (
         flag(
-            "yield_to_strangers",
+            "yield_to_moving_obstacles",
             False,
-            "yield_to_strangers",
+            "yield_to_moving_obstacles",
             "A robot makes room for a tracked obstacle that keeps it from its goal.",
         ),
         (PeerParams,),
     ),
     (
         double(
-            "stranger_patience",
+            "moving_obstacle_patience",
             3.0,
-            "stranger_patience_s",
+            "moving_obstacle_patience_s",
             "seconds",
-            "Time without progress until a robot makes room for a stranger; up to twice as much is"
-            " added at random.",
+            "Time without progress until a robot makes room for a moving obstacle; up to twice as"
+            " much is added at random.",
             low=0.1,
             high=60,
         ),
