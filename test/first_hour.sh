@@ -2,7 +2,7 @@
 # first_hour.sh
 #
 # Runs what a user does in the first hour with an own scene, world, map, robot and goals: one command
-# for each, as in the README. Flights with ROS have a roscore of their own. Ends at the first
+# for each, as in the documents. Flights with ROS have a roscore of their own. Ends at the first
 # command that fails.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

@@ -17,10 +17,9 @@ Reading order:
 7. ``config``, ``scenario``: move_base's YAML to parameters; scene, goals and configuration to a
    checked set-up. ``files`` reads what users give.
 8. ``offline``, ``topics``, ``ros``: the two shells, and the contents of the topics.
-9. ``recording``, ``report``, ``barn``, ``tuning``, ``cli``: what is built on flights.
-10. ``api``, ``rl``: flights for Python programs and for learning.
+9. ``recording``, ``report``, ``cli``, ``api``: what is built on flights.
 
-``docs/architecture.md`` has a picture of the loop and of the packages.
+``docs/architecture.md`` has the walk from ``tick`` to the command, and a picture of the packages.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Summary of a mission: its figures, and their JSON, documented in ``docs/goals.md``.
+"""Summary of a mission: its figures, and their JSON, documented in ``docs/summary.md``.
 
 ``summary_table`` prints the same figures as tables.
 """

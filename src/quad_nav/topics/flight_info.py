@@ -2,7 +2,7 @@
 
 `/quad/flight` is latched and holds one JSON object; the objects of several publishers are merged.
 `/quad/events` holds one JSON object for each action of a sequencer. Both are `std_msgs/String`;
-`docs/recording.md` lists the keys. `/simulation/contacts` holds one
+`docs/topics.md` lists the keys. `/simulation/contacts` holds one
 `diagnostic_msgs/DiagnosticStatus` for each contact; this module has its values.
 """
 

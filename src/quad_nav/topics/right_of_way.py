@@ -1,7 +1,7 @@
 """What a robot does for its peers, as `/move_base{i}/right_of_way` tells it.
 
 The topic holds one latched `diagnostic_msgs/DiagnosticStatus`, published on each change. This
-module has its values and decides when it changes; `docs/recording.md` lists them.
+module has its values and decides when it changes; `docs/topics.md` lists them.
 """
 
 from __future__ import annotations
