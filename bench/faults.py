@@ -37,7 +37,7 @@ from typing import Any, Dict, Iterator, List, Optional, Tuple
 import tabulate
 from bad_messages import TRUE_ODOMETRY, FutureTransform, OdometryRelay
 from fault_kinds import COMPOSED_KINDS, SEPARATE_KINDS, STOP, Kind
-from launched import Launch, Watch, answers, wait_for
+from launched import ENDED, Launch, Watch, answers, wait_for
 from link import HERE_IP, THERE_IP, Link, why_no_links
 
 MISSION_S = 18.0
@@ -219,7 +219,7 @@ def judge(flown: Dict[str, Any], watch: Watch, kind: Kind, outcome: Outcome) -> 
     outcome.problems += [f"contact: {contact}" for contact in flown.get("contacts", [])]
     if len(goals) != 3:
         outcome.problems.append(f"{len(goals)} goals in the summary, expected 3")
-    ended = [(event["robot"], event["goal"]) for event in watch.events if event["event"] == "ended"]
+    ended = [(one.robot, one.goal) for one in watch.events if one.event in ENDED]
     if len(ended) != len(set(ended)):
         outcome.problems.append(f"a goal has ended twice: {ended}")
 

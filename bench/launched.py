@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import signal
@@ -15,6 +14,10 @@ from xmlrpc.client import ServerProxy
 
 from link import HERE_IP
 
+from quad_nav.mission.actions import Event
+from quad_nav.topics.mission_events import MissionEvent, mission_event_from_message
+
+ENDED = (Event.REACHED, Event.SKIPPED)
 TIMEOUT_S = 150.0  # wall time
 
 
@@ -25,20 +28,22 @@ class Watch:
         """Subscribe to the odometry of robots 0 and 1 and to the events."""
         import rospy
         from nav_msgs.msg import Odometry
-        from std_msgs.msg import String
+        from quad.msg import MissionEvent as MissionEventMessage
 
         rospy.init_node("faults", anonymous=True, disable_signals=True)
-        self.events: List[Dict[str, Any]] = []
+        self.events: List[MissionEvent] = []
         self.now_s = 0.0
         self._places_m: Dict[int, Tuple[float, float]] = {}
         self.speeds_mps: List[Tuple[float, int, float]] = []  # time, robot, speed
-        self._subscribers = [rospy.Subscriber("/quad/events", String, self._on_event)] + [
+        events = rospy.Subscriber("/quad/events", MissionEventMessage, self._on_event)
+        self._subscribers = [events] + [
             rospy.Subscriber(topic, Odometry, self._on_odometry, robot)
             for robot, topic in enumerate(odometry)
         ]
 
     def _on_event(self, message: Any) -> None:
-        self.events.append(json.loads(message.data))
+        stamp_s = message.header.stamp.to_sec()
+        self.events.append(mission_event_from_message(message, stamp_s))
 
     def _on_odometry(self, message: Any, robot: int) -> None:
         v = message.twist.twist.linear
@@ -50,20 +55,20 @@ class Watch:
     @property
     def done(self) -> Set[int]:
         """Robots without further goals."""
-        return {event["robot"] for event in self.events if event["event"] == "done"}
+        return {event.robot for event in self.events if event.event is Event.DONE}
 
     @property
     def ended(self) -> int:
         """Number of goals that have ended."""
-        return sum(event["event"] == "ended" for event in self.events)
+        return sum(event.event in ENDED for event in self.events)
 
     def remaining_m(self, robot: int) -> float:
         """Distance of a robot to the goal that was sent last; inf before the first one."""
-        sent = [e for e in self.events if e["event"] == "sent" and e["robot"] == robot]
+        sent = [e for e in self.events if e.event is Event.SENT and e.robot == robot]
         if not sent or robot not in self._places_m:
             return math.inf
         x, y = self._places_m[robot]
-        return math.hypot(sent[-1]["x_m"] - x, sent[-1]["y_m"] - y)
+        return math.hypot(sent[-1].pose.x_m - x, sent[-1].pose.y_m - y)
 
     def first(self, robot: int, after_s: float, holds: Callable[[float], bool]) -> float:
         """First time after ``after_s`` at which ``holds`` accepts the speed; inf for never."""

@@ -17,8 +17,8 @@ from typing import List
 import click
 import numpy as np
 
+from quad_nav.mission.actions import Action, GoalEnded
 from quad_nav.mission.robot_goals import RobotGoals
-from quad_nav.mission.sequencer import Action, GoalEnded
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.offline.run import fly

@@ -211,16 +211,14 @@ class Contacts:
 
     def __init__(self) -> None:
         import rospy
-        from diagnostic_msgs.msg import DiagnosticStatus
+        from quad.msg import Contact
 
         self.seen: List[str] = []
-        rospy.Subscriber("/simulation/contacts", DiagnosticStatus, self._add, queue_size=QUEUE)
+        rospy.Subscriber("/simulation/contacts", Contact, self._add, queue_size=QUEUE)
 
     def _add(self, message: Any) -> None:
-        values = {one.key: one.value for one in message.values}
-        self.seen.append(
-            f"{values.get('robot')} with {values.get('with')} at {values.get('time_s')} s"
-        )
+        time_s = message.header.stamp.to_sec()
+        self.seen.append(f"{message.robot} with {message.other} at {time_s:.2f} s")
 
 
 class Rviz:

@@ -23,8 +23,8 @@ from rich.progress import track
 
 from quad_nav.files.shipped import shipped
 from quad_nav.geometry import angle_difference
+from quad_nav.mission.actions import Action, GoalEnded
 from quad_nav.mission.robot_goals import RobotGoals
-from quad_nav.mission.sequencer import Action, GoalEnded
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.offline.run import fly
 from quad_nav.offline.workers import LocalWorkers, fly_all

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from quad_nav.errors import InputError
 from quad_nav.files.output import make_folder, output_faults
 from quad_nav.geometry import Pose2D, Pose3D, Scan
-from quad_nav.mission.sequencer import Action
+from quad_nav.mission.actions import Action
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.recording.viewer_solids import colour_of, solid

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import resource
 import sys
 import types
@@ -53,7 +52,7 @@ def test_an_older_recording_stays_until_the_new_one_is_complete(tmp_path):
     assert path.read_bytes() == b"older"
     flight.end("enough")
     assert len(read(path, "/odom0")) == 2
-    assert json.loads(read(path, FLIGHT_TOPIC)[-1].content.data)["reason"] == "enough"
+    assert read(path, FLIGHT_TOPIC)[-1].content.reason == "enough"
     assert not path.with_name("flight.bag.active").exists()
 
 
@@ -68,7 +67,7 @@ def test_an_interrupted_flight_leaves_a_recording(tmp_path):
 
     summary = fly(setup(tmp_path), [Recorder(path), Stop()])
     assert summary.reason == INTERRUPTED
-    assert json.loads(read(path, FLIGHT_TOPIC)[-1].content.data)["reason"] == INTERRUPTED
+    assert read(path, FLIGHT_TOPIC)[-1].content.reason == INTERRUPTED
 
 
 def test_a_flight_that_fails_leaves_a_recording(tmp_path):
@@ -79,7 +78,7 @@ def test_a_flight_that_fails_leaves_a_recording(tmp_path):
     path = tmp_path / "flight.bag"
     with pytest.raises(ZeroDivisionError):
         fly(setup(tmp_path), [Recorder(path), Faulty()])
-    reason = json.loads(read(path, FLIGHT_TOPIC)[-1].content.data)["reason"]
+    reason = read(path, FLIGHT_TOPIC)[-1].content.reason
     assert reason == "ended by ZeroDivisionError"
 
 
