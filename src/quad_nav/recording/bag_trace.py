@@ -107,8 +107,15 @@ def _limited_memory(path: Path) -> Iterator[None]:
 
 
 def _read(path: Path, progress: Progress) -> TraceReader:
+    def is_wanted(topic: str, kind: str) -> bool:
+        if topic in (FLIGHT_TOPIC, EVENTS_TOPIC) and kind == "std_msgs/String":
+            raise InputError(
+                [f"{path}: {topic}: is {kind}, as quad 0.2.0 records it; read it with that version"]
+            )
+        return _is_wanted(topic, kind)
+
     reader = TraceReader()
-    for message in read_messages(path, _is_wanted, progress):
+    for message in read_messages(path, is_wanted, progress):
         try:
             reader.add(message)
         except ValueError as error:

@@ -15,7 +15,7 @@ from quad_nav.geometry import Pose2D, Pose3D, Twist2D, quaternion_from_yaw
 from quad_nav.mission.actions import SendGoal
 from quad_nav.navigator.tick import RecoveryStart, RobotPoses, State, Tick, Trigger
 from quad_nav.offline.flight import FlightObserver
-from quad_nav.recording import messages
+from quad_nav.recording import bag_file, messages
 from quad_nav.recording.bag_trace import read_trace
 from quad_nav.recording.record_file import create
 from quad_nav.recording.recorder import Recorder
@@ -319,6 +319,19 @@ def test_a_damaged_chunk_is_refused(tmp_path):
 def test_an_invalid_message_is_named(tmp_path, topic, content):
     path = bag(tmp_path / "flight.bag", ("/odom0", 1, odometry(1, 0.0)), (topic, 2, content))
     with pytest.raises(InputError, match=f"flight.bag: {topic}: invalid message: .*expected"):
+        read_trace(path)
+
+
+def test_a_recording_of_an_older_version_is_refused(tmp_path):
+    path = bag(tmp_path / "flight.bag", ("/quad/flight", 1, messages.text("{}")))
+    with pytest.raises(InputError, match="/quad/flight: is std_msgs/String, as quad 0.2.0 rec"):
+        read_trace(path)
+
+
+def test_a_message_with_another_definition_is_refused(tmp_path, monkeypatch):
+    path = bag(tmp_path / "flight.bag", ("/quad/flight", 1, messages.flight_info(FlightInfo())))
+    monkeypatch.setattr(bag_file, "definition", lambda kind: ("", "0" * 32))
+    with pytest.raises(InputError, match="quad/FlightInfo has another definition"):
         read_trace(path)
 
 
