@@ -50,7 +50,7 @@ def test_a_pipe_a_folder_and_a_device_are_refused_at_once(tmp_path, name, read):
 
 
 @pytest.mark.parametrize(
-    "name, read", [item for item in READERS.items() if item[0][-3:] not in ("bag", "cap", "npz")]
+    "name, read", [item for item in READERS.items() if item[0][-3:] not in ("bag", "npz")]
 )
 def test_a_file_of_a_gigabyte_is_refused_before_it_is_read(tmp_path, name, read):
     path = tmp_path / name
