@@ -9,7 +9,7 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance replay-vehicles fly-vehicles replay-airframe bench-airframe fuzz bench bench-compare bench-startup bench-original bench-fleets packages venv workspace clean distclean
+.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance replay-vehicles fly-vehicles replay-airframe fuzz bench bench-compare bench-fleets packages venv workspace clean distclean
 
 help:  ## List the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -62,7 +62,7 @@ first-hour: workspace  ## What a user does first: an own scene, map, robot, goal
 
 # Not in `make test`: Ray is an extra, 70 MB. The cluster is on this machine.
 ray: packages  ## The tests with a Ray cluster, in an environment of their own
-	@scripts/make_venv .venv-ray requirements.txt requirements-test.txt
+	@scripts/make_venv .venv-ray requirements.txt requirements-tune.txt requirements-test.txt
 	@.venv-ray/bin/python3 -m pip install --quiet '.[ray]'
 	PYTHONPATH=src .venv-ray/bin/python3 -m pytest test/ray
 
@@ -96,34 +96,22 @@ bench: venv  ## How long parts, scans and flights take; writes a file: make benc
 	@rm -f $(NAME).json
 	PYTHONPATH=src $(PYTHON) -m quad_nav.scenario.warm_up
 	PYTHONPATH=src $(PYTHON) bench/navigation.py --json $(NAME).json
-	PYTHONPATH=src $(PYTHON) bench/lidar.py --json $(NAME).json
 	PYTHONPATH=src $(PYTHON) bench/flight.py --json $(NAME).json
 	PYTHONPATH=src $(PYTHON) bench/flight.py --json $(NAME).json --config default
-	PYTHONPATH=src $(PYTHON) bench/rl.py --json $(NAME).json
 	@echo "quad: the figures are in $(NAME).json"
 
 # make itself ends with 2 on any failure and names the command's own exit status in its message.
 bench-compare: venv  ## What got slower between two runs: make bench-compare A=before.json B=after.json
 	@PYTHONPATH=src $(PYTHON) bench/figures.py $(ARGS) $(A) $(B)
 
-bench-startup: workspace  ## How long a navigator takes to start, and its memory: make bench-startup ARGS="--rate 1"
-	@scripts/ros_env python3 bench/startup.py $(ARGS)
-
-# Where C++ move_base is built in another workspace: ARGS="--workspace ~/navigation_ws".
-bench-original: workspace  ## The same flights with C++ move_base, where it is installed, and with ours
-	@scripts/ros_env python3 bench/against_original.py $(ARGS)
-
 bench-fleets: venv  ## Whether fleets get through without touching: make bench-fleets ARGS="swap 8in12"
 	PYTHONPATH=src $(PYTHON) bench/encounters.py $(ARGS)
-
-bench-airframe: venv  ## The tutorial's mission with a slow airframe, 20 seeds: make bench-airframe ARGS="--seeds 5"
-	PYTHONPATH=src $(PYTHON) bench/airframe.py $(ARGS)
 
 packages:  ## Install the system packages
 	@scripts/install_packages $(if $(and $(DISPLAY),$(filter fly,$(MAKECMDGOALS))),--rviz)
 
 venv: packages  ## Make the virtual environment, with the command .venv/bin/quad
-	@scripts/make_venv .venv requirements.txt
+	@scripts/make_venv .venv requirements.txt requirements-tune.txt
 	@scripts/make_command .venv
 
 workspace: venv  ## Build the catkin workspace

@@ -32,7 +32,6 @@ setuptools.setup(
     package_data={
         "quad_nav": ["py.typed", "*.pyi"],
         "quad_nav.config": ["*.pyi"],
-        "quad_nav.kernels": ["*.c"],
         "quad_nav.report": ["*.jinja"],
         "quad_tune.report": ["*.jinja"],
         "quad_web": ["static/*"],

@@ -2,14 +2,11 @@
 
     python bench/encounters.py                            # all of them, 20 seeds each
     python bench/encounters.py corridor 8in12 --seeds 100 --jobs 4
-    python bench/encounters.py --config moving --cut-links 0.5   # half of the time no word
-    python bench/encounters.py --config moving --set fixes/avoid_peers=false
+    python bench/encounters.py --config moving --set peers/avoid_peers=false
 
 ``mission`` is the tutorial's mission, ``8in12`` are eight quadcopters with a random mission in an
 arena of 12 m; the other names are those of ``goals/encounters``. Starts are displaced by up to
 0.3 m, except in random missions, which differ anyway. Missions that loop are flown for ten minutes.
-``--cut-links`` cuts what each robot hears of each other one for that share of the time, in outages
-of random length, see ``quad_nav.peers.links``.
 The exit status is 1 if there was a contact.
 """
 
@@ -28,7 +25,6 @@ from quad_nav.files.shipped import shipped
 from quad_nav.mission.summary import MissionSummary
 from quad_nav.offline.run import fly
 from quad_nav.offline.workers import LocalWorkers, fly_all
-from quad_nav.peers.links import LinkOutages
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.scenario.warm_up import simulate, warm_up
 from quad_nav.sim.simulation_params import SimulationParams
@@ -65,13 +61,12 @@ HEADER = [
 
 @dataclass(frozen=True)
 class Task:
-    """A flight: its name, seed and configuration, what is set on top of it, and outages."""
+    """A flight: its name, seed and configuration, and what is set on top of it."""
 
     encounter: str
     seed: int
     config: str
     parameters: Tuple[Tuple[str, Any], ...] = ()
-    links: LinkOutages = LinkOutages()
 
 
 @dataclass(frozen=True)
@@ -133,7 +128,7 @@ def options_of(encounter: str, seed: int, config: str) -> FlightOptions:
 def setup_of(task: Task) -> FlightSetup:
     """Return the set-up of a flight."""
     options = options_of(task.encounter, task.seed, task.config)
-    return replace(read_setup(replace(options, parameters=task.parameters)), links=task.links)
+    return read_setup(replace(options, parameters=task.parameters))
 
 
 def fly_encounter(task: Task) -> EncounterResult:
@@ -201,8 +196,6 @@ def parameter(text: str) -> Tuple[str, Any]:
     help="Flights at the same time. [default: one per core]",
 )
 @click.option("--set", "parameters", multiple=True, help="PATH=VALUE on top of it.")
-@click.option("--cut-links", default=0.0, show_default=True, help="Share of time without a word.")
-@click.option("--outage", default=5.0, show_default=True, help="Mean seconds of an outage.")
 def main(
     encounters: Sequence[str],
     config: str,
@@ -210,17 +203,13 @@ def main(
     first_seed: int,
     jobs: int,
     parameters: Sequence[str],
-    cut_links: float,
-    outage: float,
 ) -> None:
     """Fly encounters with many seeds and print a table of the results."""
     encounters = encounters or USUAL
-    given, links = tuple(map(parameter, parameters)), LinkOutages(cut_links, outage)
+    given = tuple(map(parameter, parameters))
     seeds_flown = range(first_seed, first_seed + seeds)
     tasks = list(
-        enumerate(
-            Task(name, seed, config, given, links) for name in encounters for seed in seeds_flown
-        )
+        enumerate(Task(name, seed, config, given) for name in encounters for seed in seeds_flown)
     )
     warm_up(setup_of(tasks[0][1]).configurations[0])
     simulate()  # compile the kernels once, not in every process
@@ -232,8 +221,8 @@ def main(
             print(one, file=sys.stderr, flush=True)
     rows = [row(name, [one for one in flights if one.encounter == name]) for name in encounters]
     print(f"Encounters offline, config {config}, seeds {first_seed} to {first_seed + seeds - 1}")
-    if parameters or cut_links:
-        print(*parameters, f"links cut for {100 * cut_links:g} % of the time", sep=", ")
+    if parameters:
+        print(*parameters, sep=", ")
     print(
         tabulate.tabulate(
             rows, HEADER, disable_numparse=True, colalign=("left",) + ("right",) * (len(HEADER) - 1)

@@ -1,7 +1,7 @@
 """Fly among people, and count contacts: how many, and what the quadcopter did then.
 
     python bench/walkers.py                                  # arena and hallway, 2 and 8 robots
-    python bench/walkers.py 2in12 corridor --seeds 10 --set fixes/avoid_moving_obstacles=false
+    python bench/walkers.py 2in12 corridor --seeds 10 --set evasion/max_speed=1.0
 
 ``8in12`` are eight quadcopters with a random mission in an arena of 12 m. ``8hallway`` are eight
 in a hallway of 4 m by 24 m, half of them at each end, which fly to the other end and back.

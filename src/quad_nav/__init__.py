@@ -9,8 +9,7 @@ ROS and takes the time as an argument. ``offline`` runs it in one process on a v
 Reading order:
 
 1. ``geometry``, ``grid``, ``footprint``: poses, cells, hulls.
-2. ``costmap``, ``plan``, ``control``: scan to costs, costs to path, path to velocity. Their loops
-   are in ``kernels``.
+2. ``costmap``, ``plan``, ``control``: scan to costs, costs to path, path to velocity.
 3. ``recovery``, ``peers``: robots that are stuck, and robots that meet.
 4. ``navigator``: move_base's state machine, which calls all of these.
 5. ``sim``: velocity to motion, pose to scan.

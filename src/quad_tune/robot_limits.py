@@ -18,7 +18,7 @@ from __future__ import annotations
 import re
 from typing import List, NamedTuple, Sequence, Tuple
 
-from quad_nav.config.fixes import FIXES
+from quad_nav.config.fixes import GROUPS
 from quad_tune.space import Dimension, SearchSpace
 
 _SPEED = re.compile(
@@ -28,6 +28,8 @@ _OTHER_LIMITS = ("holonomic_robot", "base_local_planner")  # another planner has
 _PROTECTED = re.compile(
     r"footprint.*|robot_radius|(in|circum)scribed_radius|.*tolerance|expected_update_rate"
     r"|(trans|rot|theta)_stopped_vel(ocity)?|scaling_speed|max_scaling_factor"
+    r"|sensor_timeout|escape_collision|plan_inside_map|respect_meter_scoring|reject_implausible_scans"
+    r"|progress_(timeout|distance)|stuck_cost_factor"
 )
 
 
@@ -47,7 +49,7 @@ def is_limit(path: str) -> bool:
 def is_protected(path: str) -> bool:
     """Return true for a parameter that is never searched, such as ``xy_goal_tolerance``."""
     words = [word for word in path.split("/") if word]
-    return words[:1] == [FIXES] or bool(words and _PROTECTED.fullmatch(words[-1]))
+    return bool(words) and (words[0] in GROUPS or bool(_PROTECTED.fullmatch(words[-1])))
 
 
 def hold_limits(space: SearchSpace) -> HeldSpace:

@@ -20,7 +20,12 @@ STOP_KEY = "."
 RATES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 0.0)
 """Steps of the slider; the last one, 0, is as fast as it goes."""
 _MARKS = {0.1: "0.1×", 1.0: "real time", 0.0: "max"}
-SOURCES = {"ros": "live, ROS", "offline": "live, offline", "replay": "recording"}
+SOURCES = {
+    "preview": "before the flight",
+    "ros": "live, ROS",
+    "offline": "live, offline",
+    "replay": "recording",
+}
 
 
 def rate_step(rate: Optional[float]) -> int:

@@ -140,11 +140,18 @@ class Page:
 
     def _make_tabs(self, place: str, names: Dict[str, str]) -> None:
         first: Any = next(iter(names))  # the name of a tab does, too
+        if "goals" in names and self._edits_only:
+            first = "goals"
         with ui.tabs(value=first, on_change=self._tab_chosen) as tabs:
             tabs.classes(f"{place}-tabs").props("dense no-caps inline-label align=left")
             for name, label in names.items():
                 ui.tab(name, label).props(f"data-testid={place}-{name}")
         self._tabs[place] = tabs
+
+    @property
+    def _edits_only(self) -> bool:
+        """Whether there is no flight yet, only goals to edit."""
+        return bool(self.client.refusal("start")) and not self.client.refusal("save_goals")
 
     def _panel(self, name: str) -> Any:
         panel = ui.element("section").classes(f"panel panel-{name}")

@@ -91,10 +91,6 @@ def bag(data: bytes) -> None:
     flight_metrics(read_trace(_written("flight.bag", data)))
 
 
-def mcap(data: bytes) -> None:
-    flight_metrics(read_trace(_written("flight.mcap", data)))
-
-
 def flight_info(data: bytes) -> None:
     """``/quad/flight`` and, line by line, ``/quad/events`` of a recording with odometry."""
     first, *events = data.decode("utf-8", "replace").split("\n")
@@ -164,7 +160,6 @@ TARGETS: Dict[str, Callable[[bytes], None]] = {
         parameters,
         command_line,
         bag,
-        mcap,
         flight_info,
         journal,
         page,

@@ -138,7 +138,7 @@ class NoPose(SensorFault):
     def faulty_tick(self, now_s, state, peers):
         if now_s - self.begin_s <= self._configuration.local_costmap.transform_tolerance_s:
             return self._navigate(now_s, state, peers)
-        located, tracks = RobotPoses(None, None), self._robot.tracker.active_tracks
+        located, tracks = RobotPoses(None, None), self._robot.scan_filters.tracks(now_s)
         return self._robot.navigator.tick(now_s, located, state.twist, peers, tracks), located
 
 

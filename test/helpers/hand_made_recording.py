@@ -25,7 +25,6 @@ SCENE = Scene(
     starts=(Pose2D(1.0, 2.0),),
     obstacles=(Box("b", 5.0, 7.0, 1.0, 1.0, 2.0),),
 )
-SUFFIXES = (".bag", ".mcap")
 LAST_S = 20.0
 SENT = {"yaw_rad": 0.0, "attempt": 1, "why": ""}
 

@@ -209,6 +209,6 @@ def without_flying(
     monkeypatch: Any, module: str, fly: Callable[[FlightTask], FlightResult] = lambda _: FLOWN
 ) -> None:
     """Let a command fly on paper."""
-    monkeypatch.setattr(f"quad_nav.cli.{module}.workers_of", lambda *_: PaperWorkers(fly))
+    monkeypatch.setattr(f"quad_tune.cli.{module}.workers_of", lambda *_: PaperWorkers(fly))
     monkeypatch.setattr("quad_tune.cli.flights_bar.warm_up", lambda _: None)
     monkeypatch.setattr("quad_tune.cli.flights_bar.simulate", lambda: None)

@@ -24,6 +24,7 @@ from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
 from quad_nav import config
+from quad_nav.config.robot_tree import RobotSource, robot_tree
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.ros.common import conversions
 from quad_nav.ros.common.packed_messages import (
@@ -53,7 +54,7 @@ FAR_GOAL = Pose2D(FAR_M + 6.5, 4.5)
 @lru_cache(maxsize=None)
 def configuration(name, robot, has_second_lidar):
     """Return a configuration of the project with small costmaps and 5 control cycles a second."""
-    tree = config.load_files(ROOT / "config" / name, {"i": str(robot)})
+    tree = robot_tree(RobotSource(name, robot))
     tree.update(robot=robot, robots=3, controller_frequency=CONTROL_HZ)
     tree["global_costmap"].update(width=ROOM_M, height=ROOM_M, resolution=0.1)
     tree["global_costmap"].update(origin_x=FAR_M * robot, origin_y=0.0)

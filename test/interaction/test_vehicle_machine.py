@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import NamedTuple
 
 import pytest
 
@@ -66,6 +67,7 @@ class Known:
     Attributes:
         may_take_off: Somebody, or the begin of the mission, has asked for a take-off.
         is_armed: At the last step.
+        disarmed_s: When its motors have stopped last.
         taken_s: Since when its pilot has it, or it hovers since its bridge has died; else None.
         is_stopped: Its mission is stopped, or must be.
         changed_s: When its bridge, its link or the mission has changed last.
@@ -76,7 +78,31 @@ class Known:
     def __init__(self, now_s):
         self.may_take_off, self.is_armed, self.is_stopped = True, False, False
         self.taken_s = self.poor_s = None
-        self.changed_s = self.stepped_s = now_s
+        self.changed_s = self.stepped_s = self.disarmed_s = now_s
+
+
+class Request(NamedTuple):
+    """Somebody has called a service of the vehicles, and waits for its response.
+
+    Attributes:
+        service: Its name.
+        asked_s: When it was called.
+        before: Numbers of the vehicles that it asks, and whether each might take off before.
+        responses: Takes the response; None if the node has died.
+    """
+
+    service: str
+    asked_s: float
+    before: dict
+    responses: list
+
+    @property
+    def takes_off(self):
+        return self.service.endswith("take_off")
+
+    @property
+    def takes_control(self):
+        return not self.service.endswith("land")
 
 
 @lru_cache(maxsize=None)
@@ -95,13 +121,15 @@ class VehicleMachine(RuleBasedStateMachine):
     Attributes:
         world: The vehicles and all nodes.
         known: What is known of each vehicle.
+        requests: Those that have no response yet.
         faults: What has gone wrong so far.
         is_alone: Whether nothing has happened yet that concerns vehicle 1, too.
     """
 
     @initialize(autopilot=st.sampled_from(["ardupilot", "px4"]))
     def begin(self, autopilot):
-        self.autopilot, self.is_alone, self.faults = autopilot, True, []
+        self.autopilot, self.is_alone = autopilot, True
+        self.requests, self.faults = [], []
         undisturbed(autopilot)
         self.world = VehicleWorld(autopilot)
         self.known = [Known(self.now_s) for _ in range(VEHICLES)]
@@ -134,15 +162,42 @@ class VehicleMachine(RuleBasedStateMachine):
             if vehicle.armed and not known.is_armed and not known.may_take_off:
                 self.faults.append(f"{self.now_s:.2f}: vehicle {number} is armed without an order")
             if known.is_armed and not vehicle.armed:
-                known.may_take_off, known.taken_s = False, None
+                known.disarmed_s = self.now_s
+                known.may_take_off, known.taken_s = self.is_asked_to_take_off(number), None
             known.is_armed = vehicle.armed
             self.check_sent(number, known, radio)
             radio.orders.clear()
             radio.setpoints.clear()
+        for request in [request for request in self.requests if request.responses]:
+            self.requests.remove(request)
+            self.take_response(request, request.responses[0])
+
+    def is_asked_to_take_off(self, number):
+        return any(request.takes_off and number in request.before for request in self.requests)
+
+    def take_response(self, request, response):
+        """Note what follows from the response to a request."""
+        is_done = response is not None and response.success
+        for number, might_take_off in request.before.items():
+            known = self.known[number]
+            known.changed_s = self.now_s
+            is_left_out = not is_done or f"quad{number}: " in response.message
+            if not is_done and request.takes_off and not known.is_armed:
+                known.may_take_off = might_take_off or self.is_asked_to_take_off(number)
+            if is_left_out or not request.takes_control:
+                continue
+            is_down = not known.is_armed and request.asked_s - known.disarmed_s > TOLD_S
+            if is_down and not request.takes_off:
+                self.faults.append(f"{self.now_s:.2f}: vehicle {number} resumes on the ground")
+            if known.taken_s is None or known.taken_s < request.asked_s:
+                known.taken_s = None
+                known.is_stopped &= request.takes_off
 
     def check_sent(self, number, known, radio):
         """Check what a bridge has sent since the last step."""
-        if known.taken_s is not None and self.now_s - known.taken_s > TOLD_S:
+        is_asked = any(one.takes_control and number in one.before for one in self.requests)
+        is_taken = known.taken_s is not None and self.now_s - known.taken_s > TOLD_S
+        if is_taken and not is_asked:
             wrong = [fields for _, fields in radio.orders if fields["command"] in (ARM, TAKE_OFF)]
             if wrong or radio.setpoints:
                 self.faults.append(f"{self.now_s:.2f}: vehicle {number} is not its bridge's")
@@ -246,31 +301,28 @@ class VehicleMachine(RuleBasedStateMachine):
     @rule(number=NUMBER, what=st.sampled_from(OF_ONE))
     def somebody_asks_one(self, number, what):
         self.touch(number)
-        self.ask(what.format(number), [self.known[number]])
+        self.ask(what.format(number), [number])
 
     @rule(what=st.sampled_from(OF_ALL))
     def somebody_asks_all(self, what):
         self.is_alone = False
-        self.ask(what, self.known)
+        self.ask(what, range(VEHICLES))
 
-    def ask(self, service, asked):
-        """Call a service, and note what follows from it."""
+    def ask(self, service, numbers):
+        """Call a service; what follows from it follows when it responds."""
+        asked = [self.known[number] for number in numbers]
         for known in asked:
             known.changed_s = self.now_s
-            if service.endswith("take_off"):
-                known.may_take_off, known.taken_s = True, None
-            elif service.endswith("stop"):
-                known.is_stopped = True
-            elif service.startswith("/vehicle") and service.endswith("resume"):
-                known.taken_s, known.is_stopped = None, False
-            elif service.endswith("resume"):
-                known.is_stopped = known.taken_s is not None
         if service.startswith("/mission"):  # it responds at once, or not at all
             response = self.world.call(service)
-            for known in asked if response is None and service.endswith("stop") else ():
-                known.is_stopped = known.taken_s is not None
+            for known in asked if response is not None and response.success else ():
+                known.is_stopped = service.endswith("stop") or known.taken_s is not None
         else:
-            self.world.ask(service)
+            before = {number: self.known[number].may_take_off for number in numbers}
+            responses = self.world.ask(service)
+            self.requests.append(Request(service, self.now_s, before, responses))
+            for known in asked if self.requests[-1].takes_off else ():
+                known.may_take_off = True
         self.run(0.3)
 
     # What must hold.

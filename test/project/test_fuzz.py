@@ -215,12 +215,12 @@ def test_messages_in_recordings(data, topic):
 
 
 @quick
-@given(st.sampled_from(["bag", "mcap"]), st.data())
-def test_recordings_with_bytes_changed(suffix, data):
-    content = bytearray((FUZZ / "corpus" / suffix / f"usual.{suffix}").read_bytes())
+@given(st.data())
+def test_recordings_with_bytes_changed(data):
+    content = bytearray((FUZZ / "corpus" / "bag" / "usual.bag").read_bytes())
     for _ in range(data.draw(st.integers(1, 4))):
         content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
-    targets.run(suffix, bytes(content))
+    targets.run("bag", bytes(content))
 
 
 @quick

@@ -17,7 +17,7 @@ SOURCES = ROOT / "src"
 PACKAGE = SOURCES / "quad_nav"
 MODULES = sorted(SOURCES.rglob("*.py"))
 
-MOST_LOOSE_MODULES = 8  # directly in quad_nav
+MOST_LOOSE_MODULES = 9  # directly in quad_nav
 MOST_LINES = 400
 MOST_FUNCTION_LINES = 40  # signature and docstring included, kernels apart
 PRINTS_ITS_OWN = ("quad_nav/config/reference.py",)  # our own documentation
@@ -35,9 +35,8 @@ def test_functions_are_short_enough():
     assert [
         f"{name(path)}:{function.lineno} {function.name}: {length(function)} lines"
         for path in MODULES
-        if path.parent.name != "kernels"
         for function in functions(ast.parse(path.read_text()))
-        if length(function) > MOST_FUNCTION_LINES
+        if length(function) > MOST_FUNCTION_LINES and not is_kernel(function)
     ] == []
 
 
@@ -151,6 +150,11 @@ def lines_of(path: Path) -> int:
 
 def length(function: ast.AST) -> int:
     return function.end_lineno - function.lineno + 1
+
+
+def is_kernel(function: ast.AST) -> bool:
+    """Return true for a function that numba compiles."""
+    return any("njit" in ast.dump(decorator) for decorator in function.decorator_list)
 
 
 def functions(tree: ast.AST) -> Iterator[ast.AST]:

@@ -164,7 +164,7 @@ LOST = replace(RUN, run=2, seed=9, arrivals_s=(20.0, None), contacts=("quad0 tou
 @pytest.mark.slow
 def test_four_that_meet_fly_round_the_middle_in_one_direction():
     """Straight on it takes 25 s to come within 0.4 m of the goals, 8 m away."""
-    in_turn = only(robots=(4,), parameters=(("fixes/roundabouts", False),), radius_m=4.0)
+    in_turn = only(robots=(4,), parameters=(("peers/roundabouts", False),), radius_m=4.0)
     rounds = only(robots=(4,), radius_m=4.0)
     before, now = fly_quad(in_turn, 0), fly_quad(rounds, 0)
     assert before.succeeded and now.succeeded

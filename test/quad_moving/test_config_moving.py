@@ -1,34 +1,55 @@
-"""Shipped configurations that are `config/moving` but for some parameters."""
+"""The shipped configurations with moving obstacles are overlays on `config/default`."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from quad_nav.config.files import leaves
+from quad_moving.evasion import Evasion, EvasionParams
+from quad_moving.tracker import Tracker
+from quad_nav import config
+from quad_nav.config.plugins import Parameters
+from quad_nav.config.robot_tree import RobotSource, robot_tree
+from quad_nav.errors import InputError
+from quad_nav.scenario.assembly import build_navigator, build_scan_filters
 
-ROOT = Path(__file__).resolve().parents[2]
+
+@pytest.mark.parametrize("name", ["moving", "people"])
+def test_an_overlay_has_the_values_of_the_default_and_its_own(name):
+    default, moving = (config.load(robot_tree(RobotSource(one, 3))) for one in ("default", name))
+    assert moving.remarks == ()
+    assert moving.global_costmap == default.global_costmap
+    assert moving.local_costmap.layers == default.local_costmap.layers
+    assert moving.local_planner.max_vel_x_mps == 0.5 and moving.local_planner.holonomic_robot
+    assert [one for one, _ in moving.scan_filters] == ["validator", "tracker"]
+    assert [one for one, _ in moving.command_filters] == ["evasion", "peers"]
 
 
-def parameters(name):
-    files = (ROOT / "config" / name).glob("*.yaml")
-    found = [leaf for file in files for leaf in leaves(file, {"i": "0"}).items()]
-    assert len(found) == len(dict(found))
-    return dict(found)
+def test_the_filters_have_the_parameters_of_their_namespaces():
+    tree = robot_tree(RobotSource("people", 0))
+    tree["tracker"] = {"timeout": 2.0}
+    configuration = config.load(tree)
+    tracker = build_scan_filters(configuration).filters[1]
+    evasion = build_navigator(configuration).filters.filters[0]
+    assert isinstance(tracker, Tracker) and tracker.params.lost_after_s == 2.0
+    assert isinstance(evasion, Evasion)
+    expected = EvasionParams(max_speed_mps=1.0, horizon_s=0.0, max_acceleration_mps2=6.0)
+    assert evasion.params == expected
 
 
 @pytest.mark.parametrize(
-    "name, differences",
+    "name, value, problem",
     [
+        ("speed", 1.0, "evasion/speed: unknown; expected one of clearance, max_speed"),
         (
-            "people",
-            {"fixes/moving_obstacle_max_acceleration", "fixes/moving_obstacle_evasion_speed"},
+            "max_speed",
+            "fast",
+            "evasion/max_speed: is 'fast'; expected a number of m/s",
         ),
+        ("clearance", -1, "evasion/clearance: is -1; expected a number of m from 0 to 2"),
+        ("clearance", True, "evasion/clearance: is True"),
+        ("clearance", float("nan"), "evasion/clearance: is nan"),
     ],
 )
-def test_a_configuration_differs_from_config_moving_in_these_alone(name, differences):
-    moving, other = parameters("moving"), parameters(name)
-    assert {
-        path for path in {*moving, *other} if moving.get(path) != other.get(path)
-    } == differences
+def test_a_wrong_parameter_is_refused(name, value, problem):
+    with pytest.raises(InputError, match=problem):
+        Evasion(Parameters({name: value}, "evasion"))

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_tracking import LIDAR, ON, PILLARS, pose_at, scan_of, times, track
+from test_tracking import LIDAR, ON, PILLARS, new_tracker, pose_at, scan_of, times, track
 
-from quad_nav.tracking.tracker import ObstacleTracker
-
-PEOPLE = replace(ON, max_acceleration_mps2=6.0)
 RADIUS_M = 0.3
 
 
@@ -21,10 +17,10 @@ def stops(now_s, then_mps=0.0, then_s=2.0):
     return ((3.0, y_m, RADIUS_M),)
 
 
-def last(discs_at, until_s, params=PEOPLE):
+def last(discs_at, until_s, params=ON):
     """Return the tracks after the last scan."""
     *_, (_, _, tracker) = track(discs_at, times(until_s), params=params)
-    return tracker.tracks
+    return tracker.known
 
 
 def test_who_has_stopped_is_a_suspect():
@@ -33,25 +29,19 @@ def test_who_has_stopped_is_a_suspect():
     np.testing.assert_allclose(tracks.suspects, [(3.0, 0.0, 0.0, 0.0, RADIUS_M)], atol=0.05)
 
 
-def test_without_passive_safety_nobody_is_suspected():
-    assert not any(
-        len(tracker.tracks.suspects) for _, _, tracker in track(stops, times(6.0), params=ON)
-    )
-
-
 def test_who_creeps_is_followed():
     """At 0.1 m/s it has no track and comes 0.8 m far."""
-    for now_s, _, tracker in track(lambda t: stops(t, 0.1), times(10.0), params=PEOPLE):
+    for now_s, _, tracker in track(lambda t: stops(t, 0.1), times(10.0), params=ON):
         if now_s > 5.0:
             place = (3.0, 0.1 * (now_s - 2.0))
-            assert len(tracker.tracks) == 0
-            np.testing.assert_allclose(tracker.tracks.suspects[:, :2], [place], atol=0.08)
+            assert len(tracker.known) == 0
+            np.testing.assert_allclose(tracker.known.suspects[:, :2], [place], atol=0.08)
 
 
 def test_who_walks_on_is_followed_until_it_has_a_track():
     known = []
-    for now_s, _, tracker in track(lambda t: stops(t, 1.0, 6.0), times(7.5), params=PEOPLE):
-        tracks, place = tracker.tracks, stops(now_s, 1.0, 6.0)[0][:2]
+    for now_s, _, tracker in track(lambda t: stops(t, 1.0, 6.0), times(7.5), params=ON):
+        tracks, place = tracker.known, stops(now_s, 1.0, 6.0)[0][:2]
         rows = np.concatenate([tracks.states, tracks.suspects[:, :4]])
         if now_s > 5.0:
             known.append(np.hypot(*(rows[:, :2] - place).T).min())
@@ -62,9 +52,9 @@ def test_who_walks_on_is_followed_until_it_has_a_track():
 def test_what_moves_for_the_first_time_is_a_suspect_before_it_is_a_track():
     first = {}
     for now_s, _, tracker in track(
-        lambda t: ((3.0, max(t - 1.0, 0.0), RADIUS_M),), times(2.0), params=PEOPLE
+        lambda t: ((3.0, max(t - 1.0, 0.0), RADIUS_M),), times(2.0), params=ON
     ):
-        for kind, rows in (("suspect", tracker.tracks.suspects), ("track", tracker.tracks.states)):
+        for kind, rows in (("suspect", tracker.known.suspects), ("track", tracker.known.states)):
             if len(rows):
                 first.setdefault(kind, now_s)
     assert 1.0 < first["suspect"] < first["track"] < 2.0
@@ -88,8 +78,8 @@ def test_what_has_always_stood_is_no_suspect(noise_m):
         return pose_at(-1.0 + 0.3 * t, 0.5 * math.sin(t), 0.6 * math.sin(0.7 * t))
 
     times_s = times(10.0, 20.0)
-    for now_s, _, tracker in track(discs_at, times_s, pose_of, PEOPLE, noise_m):
-        suspects, walker = tracker.tracks.suspects, discs_at(now_s)[-1][:2]
+    for now_s, _, tracker in track(discs_at, times_s, pose_of, ON, noise_m):
+        suspects, walker = tracker.known.suspects, discs_at(now_s)[-1][:2]
         assert (np.hypot(*(suspects[:, :2] - walker).T) < 0.5).all()
 
 
@@ -109,8 +99,8 @@ def test_who_is_hidden_is_known_for_a_minute(until_s, known):
 @pytest.mark.parametrize("peer_x_m, known", [(3.45, 1), (3.25, 0)])
 def test_a_peer_beside_it_is_another_one(peer_x_m, known):
     """Its circle of 0.5 m is known; who halted stands in the inner 0.3 m of none."""
-    tracker = ObstacleTracker(PEOPLE, "map")
+    tracker = new_tracker()
     for now_s in times(6.0):
         peers = np.array([(peer_x_m, 0.0, 0.5)]) if now_s > 5.5 else np.empty((0, 3))
         tracker.add_scan("scan", scan_of(now_s, stops(now_s)), LIDAR, known_circles=peers)
-    assert len(tracker.tracks.suspects) == known
+    assert len(tracker.known.suspects) == known

@@ -8,15 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from quad_moving.association import assign
+from quad_moving.discs import Outlines
+from quad_moving.moving_points import TrackerParams
+from quad_moving.tracker import Tracker
+from quad_nav.config.plugins import Parameters
 from quad_nav.geometry import Pose3D, Scan, quaternion_from_yaw
-from quad_nav.tracking.association import assign
-from quad_nav.tracking.discs import Outlines
-from quad_nav.tracking.tracker import ObstacleTracker
-from quad_nav.tracking.tracks import TrackerParams
 
 BEAMS = 512
 STEP_RAD = 2.0 * math.pi / BEAMS
-ON = TrackerParams(track_moving_obstacles=True)
+ON = TrackerParams(range_m=10.0, lost_after_s=1.5)
 LIDAR = Pose3D(0.0, 0.0, 1.0)
 ROOM = (-6.0, -6.0, 6.0, 6.0)
 
@@ -52,9 +53,15 @@ def scan_of(stamp_s, discs=(), pose=LIDAR, room=ROOM, noise_m=0.0, seed=0):
     return Scan(stamp_s, -math.pi, STEP_RAD, 0.02, 60.0, ranges.astype(np.float32))
 
 
+def new_tracker(params=ON):
+    tracker = Tracker(Parameters({}, "tracker"))
+    tracker.params = params
+    return tracker
+
+
 def track(discs_at, times_s, pose_of=lambda _: LIDAR, params=ON, noise_m=0.0):
     """Yield time, result and tracker after each scan of discs that move."""
-    tracker = ObstacleTracker(params, "map")
+    tracker = new_tracker(params)
     for time_s in times_s:
         pose = pose_of(time_s)
         scan = scan_of(time_s, discs_at(time_s), pose, noise_m=noise_m)
@@ -75,20 +82,20 @@ def test_a_crossing_cylinder_is_tracked(speed_mps, rate_hz):
     for now_s, _, tracker in track(
         lambda t: ((3.0, -4.0 + speed_mps * t, 0.3),), times(7.0 / speed_mps, rate_hz)
     ):
-        if len(tracker.tracks):
+        if len(tracker.known):
             confirmed_s = min(confirmed_s, now_s) if confirmed_s == confirmed_s else now_s
             truth = (3.0, -4.0 + speed_mps * now_s, 0.0, speed_mps)
-            errors.append(np.abs(tracker.tracks.states[0] - truth))
-            assert len(tracker.tracks) == 1 and tracker.tracks.numbers[0] == 1
+            errors.append(np.abs(tracker.known.states[0] - truth))
+            assert len(tracker.known) == 1 and tracker.known.numbers[0] == 1
     assert confirmed_s <= 0.4 + 0.3 / speed_mps
     settled = np.array(errors[round(rate_hz) :])
     assert settled[:, :2].max() < 0.05 and settled[:, 2:].max() < 0.15
-    assert tracker.tracks.radii_m[0] == pytest.approx(0.3, abs=0.05)
+    assert tracker.known.radii_m[0] == pytest.approx(0.3, abs=0.05)
 
 
 def test_an_obstacle_that_comes_nearer_is_tracked():
     *_, (_, _, tracker) = track(lambda t: ((5.0 - t, 0.0, 0.3),), times(2.0))
-    np.testing.assert_allclose(tracker.tracks.states, [(3.0, 0.0, -1.0, 0.0)], atol=0.1)
+    np.testing.assert_allclose(tracker.known.states, [(3.0, 0.0, -1.0, 0.0)], atol=0.1)
 
 
 @pytest.mark.parametrize("older_s", [0.005, 0.03, 0.09, 0.2])
@@ -99,15 +106,15 @@ def test_two_lidars_measure_one_speed(speed_mps, older_s):
     def disc_at(now_s):
         return ((3.0, -4.0 + speed_mps * now_s, 0.3),)
 
-    tracker, errors = ObstacleTracker(ON, "map"), []
+    tracker, errors = new_tracker(), []
     for now_s in times(7.0 / speed_mps):
         for sensor, stamp_s in (("front", now_s), ("back", now_s - older_s)):
             if stamp_s >= 0.0:
                 tracker.add_scan(sensor, scan_of(stamp_s, disc_at(stamp_s)), LIDAR)
-                if len(tracker.tracks):
-                    truth = (*disc_at(tracker.tracks.time_s)[0][:2], 0.0, speed_mps)
-                    errors.append(tracker.tracks.states[0] - truth)
-                    assert tracker.tracks.numbers.tolist() == [1]
+                if len(tracker.known):
+                    truth = (*disc_at(tracker.known.time_s)[0][:2], 0.0, speed_mps)
+                    errors.append(tracker.known.states[0] - truth)
+                    assert tracker.known.numbers.tolist() == [1]
     settled = np.abs(errors[20:])
     assert settled[:, :2].max() < 0.05 and settled[:, 2:].max() < 0.15
     assert abs(np.mean(errors[20:], axis=0)[3]) < 0.02 * speed_mps
@@ -120,7 +127,7 @@ def test_standing_things_do_not_move_for_a_lidar_that_flies_and_turns(noise_m, r
         return pose_at(-1.0 + 0.5 * t, 0.5 * math.sin(t), 0.6 * math.sin(0.7 * t))
 
     for _, _, tracker in track(lambda _: PILLARS, times(12.0, rate_hz), pose_of, noise_m=noise_m):
-        assert len(tracker.tracks) == 0
+        assert len(tracker.known) == 0
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -134,7 +141,7 @@ def test_a_field_of_thin_pillars_does_not_move(seed):
         return pose_at(-5.0 + 0.7 * t, 0.2 * math.sin(t), 0.5 * math.sin(1.3 * t))
 
     for _, _, tracker in track(lambda _: pillars, times(12.0, 20.0), pose_of, noise_m=0.01):
-        assert len(tracker.tracks) == 0
+        assert len(tracker.known) == 0
 
 
 def test_nothing_is_clustered_or_tracked_where_nothing_moves():
@@ -148,23 +155,23 @@ def test_a_wall_that_comes_into_view_behind_a_pillar_does_not_move():
         times(8.0),
         lambda t: pose_at(0.0, -2.0 + 0.5 * t),
     ):
-        assert len(tracker.tracks) == 0
+        assert len(tracker.known) == 0
 
 
 def test_an_obstacle_that_passes_behind_a_pillar_keeps_its_number():
     numbers, hidden_s = [], []
     for now_s, _, tracker in track(lambda t: ((2.0, 0.0, 0.3), (4.0, -3.0 + t, 0.25)), times(6.0)):
         if now_s > 1.0:
-            numbers += tracker.tracks.numbers.tolist()
-            assert len(tracker.tracks) == 1
+            numbers += tracker.known.numbers.tolist()
+            assert len(tracker.known) == 1
             hidden_s.append(abs(-3.0 + now_s) < 0.3)
-            assert tracker.tracks.states[0, 1] == pytest.approx(-3.0 + now_s, abs=0.15)
+            assert tracker.known.states[0, 1] == pytest.approx(-3.0 + now_s, abs=0.15)
     assert set(numbers) == {1} and any(hidden_s)
 
 
 def test_two_obstacles_that_pass_each_other_keep_their_numbers():
     *_, (_, _, tracker) = track(lambda t: ((3.0, -3.0 + t, 0.25), (4.2, 3.0 - t, 0.25)), times(6.0))
-    velocities = dict(zip(tracker.tracks.numbers.tolist(), tracker.tracks.states[:, 3]))
+    velocities = dict(zip(tracker.known.numbers.tolist(), tracker.known.states[:, 3]))
     assert set(velocities) == {1, 2}
     assert sorted(velocities.values()) == pytest.approx([-1.0, 1.0], abs=0.1)
 
@@ -177,7 +184,7 @@ def test_who_comes_out_of_a_long_shadow_is_tracked_where_it_was_free_long_ago():
         return (hider, (5.0, 10.0 - t, 0.25)) if t >= 9.5 else (hider,)
 
     for now_s, _, tracker in track(discs_at, times(10.9, 20.0)):
-        seen = np.hypot(*(tracker.tracks.states[:, :2] - (5.0, 10.0 - now_s)).T) < 0.2
+        seen = np.hypot(*(tracker.known.states[:, :2] - (5.0, 10.0 - now_s)).T) < 0.2
     assert seen.any()
 
 
@@ -188,7 +195,7 @@ def test_a_lidar_that_tilts_follows_an_obstacle_that_turns_back():
         times(2.5, 20.0),
         lambda t: tilted(0.14 if t > 2.0 else 0.0),
     )
-    np.testing.assert_allclose(tracker.tracks.states[:, :2], [(5.0, -0.5)], atol=0.15)
+    np.testing.assert_allclose(tracker.known.states[:, :2], [(5.0, -0.5)], atol=0.15)
 
 
 def test_a_lidar_that_tilts_and_looks_over_an_obstacle_does_not_lose_it():
@@ -199,7 +206,7 @@ def test_a_lidar_that_tilts_and_looks_over_an_obstacle_does_not_lose_it():
         times(2.6, 20.0),
         lambda t: tilted(-0.2 if t >= 2.0 else 0.0),
     ):
-        tracks[round(now_s, 2)] = tracker.tracks
+        tracks[round(now_s, 2)] = tracker.known
     assert tracks[2.6].numbers.tolist() == tracks[1.9].numbers.tolist() == [1]
     assert tracks[2.6].states[0, 1] == pytest.approx(0.6, abs=0.1)
 
@@ -220,18 +227,18 @@ def test_a_part_far_from_a_track_is_not_its_obstacle():
 def test_an_obstacle_that_stops_becomes_a_standing_one():
     moving = {}
     for now_s, result, tracker in track(lambda t: ((3.0, -2.0 + min(t, 2.0), 0.3),), times(6.0)):
-        moving[round(now_s, 1)] = len(tracker.tracks)
+        moving[round(now_s, 1)] = len(tracker.known)
         last = result
     assert moving[2.0] == 1 and moving[6.0] == 0
     ended_s = max(time_s for time_s, count in moving.items() if count)
     assert 2.5 < ended_s < 5.0
-    assert last is None  # its beams mark again
+    assert not last.any_moving  # its beams mark again
 
 
 def test_an_obstacle_that_starts_again_is_tracked_again():
     for now_s, _, tracker in track(lambda t: ((3.0, max(0.0, t - 5.0), 0.3),), times(6.0)):
-        assert now_s > 5.0 or len(tracker.tracks) == 0
-    assert tracker.tracks.states[0, 3] == pytest.approx(1.0, abs=0.15)
+        assert now_s > 5.0 or len(tracker.known) == 0
+    assert tracker.known.states[0, 3] == pytest.approx(1.0, abs=0.15)
 
 
 def test_an_obstacle_that_vanishes_in_sight_is_dropped_at_once():
@@ -239,14 +246,14 @@ def test_an_obstacle_that_vanishes_in_sight_is_dropped_at_once():
     for now_s, _, tracker in track(
         lambda t: ((3.0, -2.0 + t, 0.3),) if t < 2.0 else (), times(3.0)
     ):
-        present.append((round(now_s, 1), len(tracker.tracks)))
+        present.append((round(now_s, 1), len(tracker.known)))
     assert dict(present)[1.9] == 1 and dict(present)[2.5] == 0
 
 
 def test_a_disc_of_which_a_pillar_hides_a_part_keeps_its_centre():
     """At 0.5 m of its path the pillar hides a half of it."""
     *_, (_, _, tracker) = track(lambda t: ((2.0, 0.0, 0.3), (4.0, -3.0 + t, 0.4)), times(2.4))
-    np.testing.assert_allclose(tracker.tracks.states[0, :2], (4.0, -0.6), atol=0.1)
+    np.testing.assert_allclose(tracker.known.states[0, :2], (4.0, -0.6), atol=0.1)
 
 
 def test_moving_beams_are_those_on_confirmed_tracks():
@@ -267,51 +274,45 @@ def test_the_scan_that_confirms_a_track_tells_where_the_obstacle_was():
 
 
 def test_known_peers_are_not_tracked_and_lost_ones_are():
-    tracker = ObstacleTracker(ON, "map")
+    tracker = new_tracker()
     for now_s in times(4.0):
         y_m = -2.0 + now_s
         known = np.array([(3.0, y_m, 0.5)]) if now_s < 2.0 else np.empty((0, 3))
         scan = scan_of(now_s, ((3.0, y_m, 0.3),))
         tracker.add_scan("scan", scan, LIDAR, known_circles=known)
-        assert now_s > 2.0 or len(tracker.tracks) == 0
-    assert tracker.tracks.states[0, 3] == pytest.approx(1.0, abs=0.1)
+        assert now_s > 2.0 or len(tracker.known) == 0
+    assert tracker.known.states[0, 3] == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_jump_of_the_pose_moves_nothing():
     for _, _, tracker in track(
         lambda _: PILLARS, times(6.0), lambda t: pose_at(0.0 if t < 3.0 else 0.4, 0.0)
     ):
-        assert len(tracker.tracks) == 0
-
-
-def test_off_nothing_is_tracked():
-    results = list(track(lambda t: ((3.0, -2.0 + t, 0.3),), times(2.0), params=TrackerParams()))
-    assert all(result is None for _, result, _ in results)
-    assert len(results[-1][2].tracks) == 0 and results[-1][2].active_tracks is None
+        assert len(tracker.known) == 0
 
 
 @pytest.mark.parametrize("lost_after_s", [0.5, 1.5, 4.0])
 def test_a_track_ends_by_the_clock(lost_after_s):
     """Nothing scans after 3 s."""
-    params = replace(ON, lost_after_s=lost_after_s, max_acceleration_mps2=6.0)
+    params = replace(ON, lost_after_s=lost_after_s)
     *_, (_, _, tracker) = track(lambda t: ((3.0, -3.0 + t, 0.3),), times(3.0), params=params)
-    number = tracker.tracks.numbers.tolist()
-    tracker.end_unseen(3.0 + lost_after_s)
-    assert tracker.tracks.numbers.tolist() == number and len(tracker.unseen_s) == 1
-    tracker.end_unseen(3.01 + lost_after_s)
-    assert not tracker.tracks.any_may_move and len(tracker.unseen_s) == 0
+    number = tracker.known.numbers.tolist()
+    tracker.tracks(3.0 + lost_after_s)
+    assert tracker.known.numbers.tolist() == number and len(tracker.known.unseen_s) == 1
+    tracker.tracks(3.01 + lost_after_s)
+    assert not tracker.known.any_may_move and len(tracker.known.unseen_s) == 0
 
 
 def test_who_was_hidden_before_the_scans_ended_is_forgotten_earlier():
     """It goes behind a pillar after 3 s, and nothing scans after 4 s."""
     pillar = (2.0, 0.5, 0.5)
     *_, (_, _, tracker) = track(lambda t: ((3.0, -3.0 + t, 0.2), pillar), times(4.0))
-    hidden_s = tracker.unseen_s[0]
+    hidden_s = tracker.known.unseen_s[0]
     assert 0.3 < hidden_s < 1.2
-    tracker.end_unseen(4.0 + 1.5 - hidden_s - 0.01)
-    assert len(tracker.tracks) == 1
-    tracker.end_unseen(4.0 + 1.5 - hidden_s + 0.01)
-    assert len(tracker.tracks) == 0
+    tracker.tracks(4.0 + 1.5 - hidden_s - 0.01)
+    assert len(tracker.known) == 1
+    tracker.tracks(4.0 + 1.5 - hidden_s + 0.01)
+    assert len(tracker.known) == 0
 
 
 def test_a_track_of_before_a_silence_is_not_continued_elsewhere():
@@ -323,17 +324,17 @@ def test_a_track_of_before_a_silence_is_not_continued_elsewhere():
     after = [now_s for now_s in times(14.0) if now_s <= 2.0 or now_s >= 12.0]
     for now_s, _, tracker in track(discs, after):
         if now_s >= 12.0:
-            assert 1 not in tracker.tracks.numbers
-    np.testing.assert_allclose(tracker.tracks.states, [(-3.0, -1.0, 0.0, -1.0)], atol=0.1)
+            assert 1 not in tracker.known.numbers
+    np.testing.assert_allclose(tracker.known.states, [(-3.0, -1.0, 0.0, -1.0)], atol=0.1)
 
 
 @pytest.mark.parametrize("back_s", [0.5, 100.0])
 def test_a_lidar_whose_clock_is_set_back_goes_on(back_s):
-    tracker = ObstacleTracker(ON, "map")
+    tracker = new_tracker()
     for now_s in times(5.0):
         stamp_s = 200.0 + now_s - (back_s if now_s >= 2.0 else 0.0)
         tracker.add_scan("scan", scan_of(stamp_s, ((3.0, -3.0 + now_s, 0.3),)), LIDAR)
-    np.testing.assert_allclose(tracker.tracks.states, [(3.0, 2.0, 0.0, 1.0)], atol=0.1)
+    np.testing.assert_allclose(tracker.known.states, [(3.0, 2.0, 0.0, 1.0)], atol=0.1)
 
 
 def test_covariances_are_honest():
@@ -350,16 +351,16 @@ def test_covariances_are_honest():
             path.append((*place, *velocity))
             change = 0.1 * ON.acceleration_mps2 * random.normal(size=2)
             place, velocity = place + 0.1 * velocity + 0.05 * change, velocity + change
-        tracker = ObstacleTracker(ON, "map")
+        tracker = new_tracker()
         for k, now_s in enumerate(times(6.0)):
             x_m, y_m = path[k][:2]
             if not (1.0 < x_m < 5.5 and abs(y_m) < 5.5):
                 break
             scan = scan_of(now_s, ((x_m, y_m, 0.3),), noise_m=0.02, seed=run)
             tracker.add_scan("scan", scan, LIDAR)
-            if len(tracker.tracks) == 1:
-                off = tracker.tracks.states[0] - path[k]
-                nees.append(off @ np.linalg.solve(tracker.tracks.covariances[0], off))
+            if len(tracker.known) == 1:
+                off = tracker.known.states[0] - path[k]
+                nees.append(off @ np.linalg.solve(tracker.known.covariances[0], off))
     assert len(nees) > 150
     assert 1.0 < np.mean(nees) < 5.0
     assert np.mean(np.array(nees) < 9.49) > 0.95  # chi-square with 4 degrees of freedom

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from quad_nav.grid import LETHAL
-from quad_nav.loop.navigator_group import LoopRobot
 from quad_nav.offline.flight import Flight
 from quad_nav.offline.run import fly
 from quad_nav.recording.bag_file import read_messages
@@ -18,12 +17,15 @@ from quad_nav.recording.recorder import Recorder
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.motion import Motion
 from quad_nav.sim.scene import Cylinder, MovingObstacle
-from quad_nav.tracking.tracker import ObstacleTracker
-from quad_nav.tracking.tracks import TrackerParams
 
 ROOT = Path(__file__).resolve().parents[2]
-ON = (("fixes/track_moving_obstacles", True),)
+ON = (("scan_filters", [{"name": "tracker", "type": "quad_moving/Tracker"}]),)
 ENCOUNTERS = ROOT / "scenes" / "encounters"
+
+
+def tracks_of(robot):
+    """The tracks at the time of the last scan."""
+    return robot.scan_filters.filters[-1].known
 
 
 def setup_of(scene, goals, parameters=ON, robots=1, seed=0):
@@ -76,7 +78,7 @@ def test_a_walker_is_tracked_while_the_robot_flies():
     """Within 8 m, from 1 s after it can be seen on; it turns at 4 s, 8 s, ..."""
     setup, errors = arena(moving=[walker((5.0, 2.0), (5.0, 6.0))]), []
     for flight in fly_for(setup, 12.0):
-        tracks, now_s = flight.offline_robots[0].tracker.tracks, flight.now_s
+        tracks, now_s = tracks_of(flight.offline_robots[0]), flight.now_s
         since_turn_s = now_s % 4.0
         if since_turn_s < 1.0 or tracks.time_s != pytest.approx(now_s) or not len(tracks):
             continue
@@ -97,7 +99,7 @@ def test_a_walker_leaves_no_trace_in_the_costmaps(layer):
     marked, tracked = 0, 0
     for flight in fly_for(setup, 14.0):
         robot = flight.offline_robots[0]
-        if flight.now_s < 1.5 or not len(robot.tracker.tracks):
+        if flight.now_s < 1.5 or not len(tracks_of(robot)):
             continue
         tracked += 1
         costmap = robot.navigator.local_costmap
@@ -126,28 +128,12 @@ def test_a_walker_that_stops_is_an_obstacle_again():
 
 def test_known_peers_are_left_out_and_lost_ones_are_tracked():
     scene, goals = "scenes/encounters/swap.yaml", "goals/encounters/swap"
-    for parameters, is_tracked in ((ON, False), ((*ON, ("fixes/avoid_peers", False)), True)):
+    for parameters, is_tracked in ((ON, False), ((*ON, ("peers/avoid_peers", False)), True)):
         counts = [
-            len(flight.offline_robots[0].tracker.tracks)
+            len(tracks_of(flight.offline_robots[0]))
             for flight in fly_for(setup_of(scene, goals, parameters, 2), 10.0)
         ]
         assert (max(counts) == 1) is is_tracked
-
-
-def test_the_tracker_is_switched_in_flight():
-    flight = Flight(arena((), [walker((5.0, 2.0), (5.0, 6.0))]))
-    robot = flight.offline_robots[0]
-    configuration = replace(flight.setup.configurations[0], tracker=TrackerParams(True))
-    for seconds, is_on in ((3.0, False), (6.0, True), (9.0, False)):
-        if is_on:
-            flight.reconfigure(0, configuration)
-        elif seconds > 3.0:
-            flight.reconfigure(0, flight.setup.configurations[0])
-        while flight.now_s < seconds:
-            flight.advance()
-        assert isinstance(robot, LoopRobot) and isinstance(robot.tracker, ObstacleTracker)
-        assert bool(len(robot.tracker.tracks)) is is_on
-    flight.end()
 
 
 def test_a_recording_has_the_markers_of_tracks(tmp_path):

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D
-from quad_nav.tracking.tracks import Tracks
 
 
 def one_track() -> Tracks:
@@ -17,6 +17,7 @@ def one_track() -> Tracks:
         np.array([[1.0, 2.0, 0.5, -1.0]]),
         np.diag([0.01, 0.04, 0.09, 0.16])[np.newaxis],
         np.array([0.3]),
+        np.array([0.0]),
         np.array([[3.0, 4.0, 0.0, 0.1, 0.25]]),
     )
 

@@ -33,7 +33,7 @@ CHANGES = (
     Change("global_costmap/update_frequency", 2.0, "n"),
     Change("controller_frequency", 20.0, "n"),
     Change("planner_frequency", 2.0, "n"),
-    Change("fixes/peer_margin", 0.1, "n"),
+    Change("peers/margin", 0.1, "n"),
 )
 
 

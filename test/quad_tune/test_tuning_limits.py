@@ -11,9 +11,12 @@ from click.testing import CliRunner
 from study_flights import FLOWN, PaperWorkers, tune_setup, without_flying, write_mission
 
 from quad_nav import config
-from quad_nav.config.spec import Table
-from quad_nav.config.tables import costmap, dwa_planner, recoveries, trajectory_planner
+from quad_nav.control.dwa_planner_params import DwaParams
+from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.costmap.map_params import MapParams
 from quad_nav.errors import InputError
+from quad_nav.parameter import parameters_of
+from quad_nav.recovery import MoveSlowAndClearParams, TurnLimits
 from quad_tune.cli.tune import tune
 from quad_tune.evaluation import StudyObserver
 from quad_tune.parameter_files import write_parameters
@@ -23,6 +26,7 @@ from quad_tune.study_text import changes
 from quad_tune.tune import run_tune
 
 ROOT = Path(__file__).resolve().parents[2]
+PLANNERS = (TrajectoryPlannerParams, DwaParams)
 SPEEDS = ("m/s", "rad/s", "m/s^2", "rad/s^2")
 LIMITS = """
   max_vel_x: 0.22
@@ -37,19 +41,16 @@ LIMITS = """
 """
 
 
-def parameters(*modules) -> list:
-    """Parameters of all tables of modules."""
-    tables = [
-        table for module in modules for table in vars(module).values() if isinstance(table, Table)
-    ]
-    return [parameter for table in tables for parameter in table.parameters]
+def parameters(*owners) -> list:
+    """Parameters of dataclasses."""
+    return [parameter for owner in owners for parameter in parameters_of(owner)]
 
 
 def test_every_speed_of_both_planners_and_the_recoveries_is_held():
-    """Units of move_base's tables tell which parameters are speeds and accelerations."""
+    """Their units tell which parameters are speeds and accelerations."""
     speeds = [
         one.name
-        for one in parameters(trajectory_planner, dwa_planner, recoveries)
+        for one in parameters(*PLANNERS, MoveSlowAndClearParams, TurnLimits)
         if one.unit in SPEEDS
     ]
     assert len(speeds) > 20
@@ -59,7 +60,7 @@ def test_every_speed_of_both_planners_and_the_recoveries_is_held():
 
 
 def test_footprint_tolerances_and_checks_are_protected():
-    names = [one.name for one in parameters(costmap, trajectory_planner, dwa_planner)]
+    names = [one.name for one in parameters(MapParams, *PLANNERS)]
     assert {name for name in names if is_protected(f"x/{name}")} == {
         "footprint",
         "footprint_padding",
@@ -76,8 +77,13 @@ def test_footprint_tolerances_and_checks_are_protected():
         "trans_stopped_vel",
         "scaling_speed",
         "max_scaling_factor",
+        "respect_meter_scoring",
     }
-    assert is_protected("fixes/peer_margin") and is_protected("/fixes/avoid_peers")
+    assert (
+        is_protected("peers/margin")
+        and is_protected("sensor_timeout")
+        and is_protected("/peers/avoid_peers")
+    )
     assert not is_limit("TrajectoryPlannerROS/trans_stopped_velocity")
 
 
@@ -88,7 +94,7 @@ def test_shipped_spaces_without_their_limits(name, held):
     kept = hold_limits(space)
     assert len(kept.held) == held
     changed = [path for path, _ in kept.space.assignments(kept.space.corners()[0])]
-    speeds = {one.name for one in parameters(trajectory_planner, dwa_planner) if one.unit in SPEEDS}
+    speeds = {one.name for one in parameters(*PLANNERS) if one.unit in SPEEDS}
     assert {path.rpartition("/")[2] for path in changed} & speeds == set()
     assert len(kept.space.dimensions) >= 9
     assert not any(map(is_protected, changed))

@@ -7,21 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_made_recording import LAST_S, SCENE, SUFFIXES, write_flight, x_at
+from hand_made_recording import LAST_S, SCENE, write_flight, x_at
 
 from quad_nav.errors import InputError
 from quad_nav.recording import messages
 from quad_nav.recording.bag_file import read_messages
-from quad_nav.recording.bag_index import RecordingIndex
 from quad_nav.sim.motion import Motion
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, MovingObstacle
 from quad_web.replay.recorded_flight import RecordedFlight
+from quad_web.replay.recording_index import RecordingIndex
 from quad_web.view.state import LAYERS
 
 
-@pytest.fixture(scope="module", params=SUFFIXES)
-def path(request, tmp_path_factory):
-    return write_flight(tmp_path_factory.mktemp("replay") / f"flight{request.param}")
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return write_flight(tmp_path_factory.mktemp("replay") / "flight.bag")
 
 
 @pytest.fixture
@@ -57,18 +57,17 @@ STREET = replace(
 )
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize(
     "cart_y_m, expected, nearest_m",
     [(None, (3.1, 6.0, 0.0), 2.0), (2.0, (10.0, 2.0, 0.0), 1.5)],
     ids=["computed from the scene", "recorded"],
 )
-def test_moving_obstacles_are_where_they_were(tmp_path, suffix, cart_y_m, expected, nearest_m):
+def test_moving_obstacles_are_where_they_were(tmp_path, cart_y_m, expected, nearest_m):
     """At 10.5 s the cart, at 0.2 m/s, is 2.1 m on; its last message is of 10 s.
 
     Robot 1 is at (8, 2): 2 m from two walls, and 1.5 m from the cart that was recorded.
     """
-    flight = RecordedFlight(write_flight(tmp_path / f"flight{suffix}", STREET, cart_y_m))
+    flight = RecordedFlight(write_flight(tmp_path / "flight.bag", STREET, cart_y_m))
     before, poses = items_at(flight, 2.0), items_at(flight, 10.5)["obstacles"].arrays["poses"]
     assert poses.tolist() == [pytest.approx(expected)]
     assert before["obstacles"].arrays["poses"][0, 0] < poses[0, 0]
@@ -93,11 +92,10 @@ def test_the_index_reads_any_message_and_no_other(path):
     index.close()
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
-def test_damaged_and_truncated_files_get_the_messages_of_the_report(tmp_path, suffix):
-    good = write_flight(tmp_path / f"flight{suffix}").read_bytes()
+def test_damaged_and_truncated_files_get_the_messages_of_the_report(tmp_path):
+    good = write_flight(tmp_path / "flight.bag").read_bytes()
     for name, content in {"empty": b"", "half": good[: len(good) // 2], "text": b"#!x\n"}.items():
-        path = tmp_path / f"{name}{suffix}"
+        path = tmp_path / f"{name}.bag"
         path.write_bytes(content)
         texts = []
         for read in (

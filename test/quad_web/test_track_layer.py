@@ -30,7 +30,7 @@ def setup_of(time_limit_s: float):
     options = FlightOptions(
         ROOT / "scenes" / "arena.yaml",
         ROOT / "goals",
-        parameters=(("fixes/track_moving_obstacles", True),),
+        parameters=(("scan_filters", [{"name": "tracker", "type": "quad_moving/Tracker"}]),),
         time_limit_s=time_limit_s,
     )
     setup = read_setup(options)

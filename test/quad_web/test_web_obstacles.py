@@ -10,6 +10,7 @@ import pytest
 
 rospy = pytest.importorskip("rospy")
 
+from quad_nav.costmap.tracks import Tracks  # noqa: E402
 from quad_nav.geometry import Pose3D, quaternion_from_yaw  # noqa: E402
 from quad_nav.ros.common.conversions import marker_array, replacing_markers  # noqa: E402
 from quad_nav.sim.motion import Motion, Walkers  # noqa: E402
@@ -17,7 +18,6 @@ from quad_nav.sim.movers import Movers  # noqa: E402
 from quad_nav.sim.scene import Box, MovingObstacle, Scene, Walls  # noqa: E402
 from quad_nav.topics.markers import OBSTACLES_TOPIC, moving_markers, moving_poses  # noqa: E402
 from quad_nav.topics.tracked_obstacles import track_markers  # noqa: E402
-from quad_nav.tracking.tracks import Tracks  # noqa: E402
 from quad_web.ros.layers import TrackIntake  # noqa: E402
 from quad_web.ros.obstacles import Obstacles  # noqa: E402
 
@@ -29,7 +29,12 @@ EMPTY = Scene("empty", 10.0, 8.0, 1.0, Walls(), (), ())
 
 
 TRACKS = Tracks(
-    3.0, np.array([7]), np.array([(1.0, 0.0, 0.5, 0.0)]), np.eye(4)[None], np.array([0.3])
+    3.0,
+    np.array([7]),
+    np.array([(1.0, 0.0, 0.5, 0.0)]),
+    np.eye(4)[None],
+    np.array([0.3]),
+    np.zeros(1),
 )
 
 
@@ -101,7 +106,7 @@ def test_tracks_are_shown_in_map_until_the_last_one_has_ended():
     tracked = TrackIntake(0, frames)
     ((name, topic),) = tracked.topics().items()
     assert name == "/move_base0/moving_obstacles" and tracked.item() is None
-    shown = replacing_markers(track_markers(TRACKS, np.zeros(1), "odom0"))
+    shown = replacing_markers(track_markers(TRACKS, "odom0"))
     deliver(topic, shown)
     assert tracked.item() is None  # the transform of odom0 is not known yet
     frames.map_from_odom = Pose3D(2.0, 1.0, 0.0, quaternion_from_yaw(math.pi / 2))
@@ -118,7 +123,7 @@ def test_tracks_are_shown_in_map_until_the_last_one_has_ended():
 def test_tracks_that_are_nowhere_are_refused():
     tracked = TrackIntake(0, FakeFrames())
     (topic,) = tracked.topics().values()
-    message = replacing_markers(track_markers(TRACKS, np.zeros(1), "map"))
+    message = replacing_markers(track_markers(TRACKS, "map"))
     message.markers[1].scale.x = math.inf
     deliver(topic, message)
     with pytest.raises(ValueError, match="marker disc 7"):

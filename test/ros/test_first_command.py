@@ -22,7 +22,8 @@ from upstream import UPSTREAM  # noqa: E402
 START = (1.5, 1.5)  # of robot 0, which faces the goal
 GOAL = (2.8, 1.5)
 OFF_THE_MAP = (20.0, 20.0)
-FIXED = {"avoid_peers": False}  # the other robot delays nothing here
+# The other robot delays nothing here.
+FIXED = {"fixes": {"upstream": False}, "peers": {"avoid_peers": False}}
 RATES_HZ = (1.0, 10.0)
 ROUNDING = 0.05  # of a control period
 
@@ -74,7 +75,8 @@ class FirstCommand(UpstreamCase):
         for rate_hz in RATES_HZ:
             with self.subTest(rate_hz=rate_hz):
                 self.return_to_start()
-                self.reconfigure("/move_base0/fixes", **fixes)
+                for group, values in fixes.items():
+                    self.reconfigure(f"/move_base0/{group}", **values)
                 self.reconfigure("/move_base0", controller_frequency=rate_hz)
                 before()
                 to_plan, to_motion = self.measure(goal_pose(*GOAL), rate_hz)

@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 import rostest
-from dynamic_reconfigure.client import Client
 from flight_case import FlightCase
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
@@ -56,15 +55,6 @@ class Tracking(FlightCase):
         self.assertEqual(markers[0].action, Marker.DELETEALL)
         self.assertEqual([m.ns for m in markers[1:]], ["disc", "ellipse", "number", "velocity"])
         self.assertEqual({m.header.frame_id for m in markers[1:]}, {"odom1"})
-
-    def test_3_tracking_is_switched_off_in_flight(self):
-        clouds = self.record("/move_base0/moving_obstacles_cloud", PointCloud2)
-        self.wait(lambda: clouds.messages, "a cloud")
-        client = Client("/move_base0/fixes", timeout=30.0)
-        client.update_configuration({"track_moving_obstacles": False})
-        self.wait(lambda: clouds.messages[-1].width == 0, "an empty cloud")
-        client.update_configuration({"track_moving_obstacles": True})
-        self.wait(lambda: clouds.messages[-1].width == 1, "a track")
 
 
 if __name__ == "__main__":

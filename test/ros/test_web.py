@@ -19,11 +19,11 @@ from visualization_msgs.msg import MarkerArray
 from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.sync.client import connect
 
+from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D
 from quad_nav.ros.common.conversions import marker_array
 from quad_nav.topics.right_of_way import RIGHT_OF_WAY_STATUS, RightOfWay
 from quad_nav.topics.tracked_obstacles import track_markers
-from quad_nav.tracking.tracks import Tracks
 from quad_web.ros.actions import FlightActions
 from quad_web.ros.source import FlightSource
 from quad_web.view.actions import GoalChange
@@ -249,8 +249,8 @@ class Web(FlightCase):
         topic = rospy.Publisher("/move_base1/moving_obstacles", MarkerArray, queue_size=1)
         self.addCleanup(topic.unregister)
         states, covariances = np.array([(3.0, 2.0, 0.5, 0.0)]), np.eye(4)[None]
-        tracks = Tracks(0.0, np.array([7]), states, covariances, np.array([0.3]))
-        message = marker_array(track_markers(tracks, np.zeros(1), "map"))
+        tracks = Tracks(0.0, np.array([7]), states, covariances, np.array([0.3]), np.zeros(1))
+        message = marker_array(track_markers(tracks, "map"))
 
         def is_shown():  # once the node web is connected
             topic.publish(message)

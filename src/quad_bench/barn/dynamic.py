@@ -45,7 +45,7 @@ PHASE_S = 100.0
 """Phases are from 0 to this."""
 PUBLISHED_SPEED_MPS = 0.5
 """``max_vel_x`` of the published figures."""
-_NO_FASTER_EVASION = ("fixes/moving_obstacle_evasion_speed", 0.0)
+_EVASION_SPEED = "evasion/max_speed"
 PUBLISHED = {"easy": 0.78, "medium": 0.43, "hard": 0.17}
 """Success rates of move_base with DWA in Gazebo, read off Fig. 5 of A. Nair et al., SSRR 2022."""
 
@@ -142,8 +142,6 @@ def read_dynamic_setup(
     Raises:
         InputError: Every fault in them.
     """
-    # The benchmark's speed limit holds for evasions too, unless the user sets another for them.
-    options = replace(options, parameters=(_NO_FASTER_EVASION, *options.parameters))
     problems: List[str] = []
     worlds: Tuple[DynamicWorld, ...] = ()
     try:
@@ -153,6 +151,11 @@ def read_dynamic_setup(
     try:
         goals = _goals(TIME_LIMIT_S)
         contestant = read_contestant(options, goals, AREA)
+        if _evasion_speed_mps(contestant) > 0.0:
+            # The benchmark's speed limit holds for evasions too, unless the user sets another one.
+            no_faster = (_EVASION_SPEED, 0.0)
+            options = replace(options, parameters=(no_faster, *options.parameters))
+            contestant = read_contestant(options, goals, AREA)
         if max_vel_x_mps > 0.0:
             limits = _speed_limits(contestant, max_vel_x_mps)
             options = replace(options, parameters=(*options.parameters, *limits))
@@ -166,10 +169,15 @@ def read_dynamic_setup(
 
 def _fast_enough(contestant: Contestant) -> Contestant:
     """Let the body fly as fast as its configuration lets it evade."""
-    simulation, evasion = contestant.simulation, contestant.configuration.navigator.evasion
-    speed_mps = max(simulation.flight.max_speed_mps, evasion.speed_mps)
+    simulation = contestant.simulation
+    speed_mps = max(simulation.flight.max_speed_mps, _evasion_speed_mps(contestant))
     flight = replace(simulation.flight, max_speed_mps=speed_mps)
     return replace(contestant, simulation=replace(simulation, flight=flight))
+
+
+def _evasion_speed_mps(contestant: Contestant) -> float:
+    filter_name, name = _EVASION_SPEED.split("/")
+    return float(contestant.configuration.tree.get(filter_name, {}).get(name, 0.0))
 
 
 def _speed_limits(contestant: Contestant, speed_mps: float) -> List[Tuple[str, float]]:

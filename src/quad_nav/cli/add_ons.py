@@ -1,4 +1,4 @@
-"""Packages beside the core: which commands they have, and how to get one that is missing."""
+"""Packages beside the core: how a command that lacks one, or what it needs, is refused."""
 
 from __future__ import annotations
 
@@ -7,15 +7,8 @@ from typing import Any, Dict
 
 import click
 
-EXTRAS: Dict[str, str] = {
-    "quad_bench": "bench",
-    "quad_moving": "moving",
-    "quad_rl": "rl",
-    "quad_tune": "tune",
-    "quad_vehicles": "vehicles",
-    "quad_web": "web",
-}
-"""Package -> extra of pip that installs what it needs."""
+EXTRAS: Dict[str, str] = {"quad_bench": "orca", "quad_tune": "tune", "quad_web": "web"}
+"""Package with commands -> extra of pip that installs what it needs."""
 
 
 def load(module: str, wanted: str) -> Any:
@@ -26,14 +19,17 @@ def load(module: str, wanted: str) -> Any:
         wanted: What needs it, as `quad tune` or `--web`, for the message.
 
     Raises:
-        ClickException: The add-on is not installed; the message says how to install it.
+        ClickException: The add-on, or a library that it needs, is not installed; the message says
+            how to install it.
     """
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError as error:
-        if error.name not in EXTRAS:
+        missing = (error.name or "").partition(".")[0]
+        if missing == "quad_nav":  # a fault of the installation, or of ours
             raise
+        package = missing if missing in EXTRAS else module.partition(".")[0]
         raise click.ClickException(
-            f"{wanted}: the add-on {error.name} is not installed; "
-            f"install it with: pip install 'quad-nav[{EXTRAS[error.name]}]'"
+            f"{wanted}: {missing} is not installed; expected it from "
+            f"pip install 'quad-nav[{EXTRAS[package]}]'"
         ) from error

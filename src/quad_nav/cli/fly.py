@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from quad_nav.cli.options import A_FILE, A_FOLDER, AMOUNT, LIVE, OUTPUT, POSITIVE, web_options
+from quad_nav.cli.options import A_FILE, A_FOLDER, AMOUNT, OUTPUT, POSITIVE, web_options
 
 # Those of quad_nav.sim.simulation, .flight and .odometry; importing them would load the engine.
 LIDAR_CASTERS = ("kernel", "bullet")
@@ -142,15 +142,8 @@ MAX_DRIFT = 1.0
 @click.option(
     "--record",
     type=A_FILE,
-    metavar="FILE.bag|FILE.mcap",
+    metavar="FILE.bag",
     help="Record the ROS topics, for rosbag play and RViz.",
-)
-@click.option(
-    "--view",
-    is_flag=False,
-    flag_value=LIVE,
-    metavar="[FILE.rrd]",
-    help="Show the flight live in rerun's 3D viewer, or save it for the viewer.",
 )
 @click.option(
     "--web",

@@ -7,14 +7,14 @@ import webbrowser
 from pathlib import Path
 from typing import Any, List, Optional
 
-from quad_nav.cli import EXIT_BAD_INPUT, EXIT_SUCCESS
-from quad_nav.cli.goal_editor import GoalEditor, serve
+from quad_nav.cli import EXIT_BAD_INPUT, EXIT_SUCCESS, add_ons
 from quad_nav.cli.offline_flight import mission_options
 from quad_nav.cli.options import echo, echo_lines, exit_on_faults, show_warnings
 from quad_nav.cli.outputs import Outputs
 from quad_nav.errors import InputError
 from quad_nav.report.preview_page import page_data, preview_page
 from quad_nav.report.preview_picture import SUFFIXES, write_picture
+from quad_nav.scenario.flight_setup import FlightOptions
 from quad_nav.scenario.preview import MissionPreview, RobotPreview
 
 _DEFAULT_OUTPUT = Path("preview.png")
@@ -30,19 +30,26 @@ def show_mission(output: Optional[Path], open_it: bool, edit: bool, **given: Any
             raise InputError([f"--output: {output}: expected a name in {', '.join(SUFFIXES)}"])
         options = mission_options(**given)
         preview = MissionPreview(options)
-        editor = GoalEditor(options, preview, title(preview, options.config)) if edit else None
+        heading = title(preview, options.config)
+        page = _goal_page(options, preview, heading) if edit else None
     robots = [preview.robot(number) for number in preview.numbers]
     _report(preview, robots)
     if output is not None and (preview.scene is not None or robots):
         with outputs.attempt("--output", output):
-            _write(preview, robots, title(preview, options.config), output)
+            _write(preview, robots, heading, output)
             echo(f"preview: {output}")
-            if open_it and editor is None:
+            if open_it and page is None:
                 _open(output.resolve().as_uri())
-    if editor is not None:
-        serve(editor, _open if open_it else lambda url: None)
+    if page is not None:
+        with exit_on_faults():
+            page.serve(open_it)
         sys.exit(EXIT_SUCCESS)
     sys.exit(outputs.exit_status(EXIT_BAD_INPUT if preview.problems else EXIT_SUCCESS))
+
+
+def _goal_page(options: FlightOptions, preview: MissionPreview, heading: str) -> Any:
+    """Return the ``GoalPage`` of the add-on."""
+    return add_ons.load("quad_web.cli.goal_page", "--edit").GoalPage(options, preview, heading)
 
 
 def title(preview: MissionPreview, config: str) -> str:

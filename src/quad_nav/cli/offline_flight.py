@@ -11,14 +11,7 @@ from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.cli import EXIT_INTERRUPTED, add_ons
-from quad_nav.cli.options import (
-    LIVE,
-    echo,
-    echo_lines,
-    exit_on_faults,
-    parameter,
-    show_warnings,
-)
+from quad_nav.cli.options import echo, echo_lines, exit_on_faults, parameter, show_warnings
 from quad_nav.cli.outputs import Outputs
 from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar
@@ -44,7 +37,6 @@ _PAGE_OPTIONS = ("address", "port", "rate", "open_it")
 def fly_mission(
     json_path: Optional[Path],
     record: Optional[Path],
-    view: Optional[str],
     report: Optional[Path],
     pictures: Optional[Path],
     animate: Optional[Path],
@@ -56,10 +48,9 @@ def fly_mission(
     """Fly with the options of ``quad fly`` and exit with its status."""
     served = {name: given.pop(name) for name in _PAGE_OPTIONS}
     with exit_on_faults():
-        saved_view = None if view in (None, LIVE) else Path(view)
         outputs = Outputs(
             {"--json": json_path, "--report": report},
-            {"--record": record, "--view": saved_view, "--animate": animate},
+            {"--record": record, "--animate": animate},
             {"--pictures": pictures},
             quiet=quiet,
         )
@@ -69,7 +60,7 @@ def fly_mission(
     while True:
         with exit_on_faults():
             drawn = FlightPictures(setup, report, pictures, animate)
-            observers = _observers(record, view)
+            observers = _observers(record)
             if not quiet:
                 show_warnings(setup.warnings)
             facts = offline_facts(options, setup, ["quad", *sys.argv[1:]])
@@ -128,18 +119,13 @@ def mission_options(parameters: Tuple[str, ...], **given: Any) -> FlightOptions:
     return options
 
 
-def _observers(record: Optional[Path], view: Optional[str]) -> List[FlightObserver]:
-    """Create recorder and viewer; imported here, because both load slowly."""
-    observers: List[FlightObserver] = []
-    if view is not None:
-        from quad_nav.recording.viewer import View
+def _observers(record: Optional[Path]) -> List[FlightObserver]:
+    """Create the recorder, if there is to be one; imported here, because it loads slowly."""
+    if record is None:
+        return []
+    from quad_nav.recording.recorder import Recorder
 
-        observers.append(View(None if view == LIVE else Path(view)))
-    if record is not None:  # last: it leaves an unfinished file if another cannot be created
-        from quad_nav.recording.recorder import Recorder
-
-        observers.append(Recorder(record))
-    return observers
+    return [Recorder(record)]
 
 
 def _fly(
@@ -171,7 +157,7 @@ def _fly(
         if not quiet:
             echo(line, err=True)
     if not any(observer.stop_reason for observer in observers):
-        outputs.announce_files("--record", "--view")
+        outputs.announce_files("--record")
     if summary.reason == INTERRUPTED:
         return EXIT_INTERRUPTED
     return outputs.exit_status(summary.exit_status)

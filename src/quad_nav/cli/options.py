@@ -23,8 +23,6 @@ AMOUNT = click.FloatRange(min=0.0)
 COUNT = click.IntRange(min=1)
 OUTPUT = click.Path(dir_okay=False, allow_dash=True, path_type=Path)
 """Type of an option whose text ``-`` sends to standard output."""
-LIVE = "live"
-"""Value of ``--view`` without a file."""
 LOOPBACK = "127.0.0.1"
 
 
@@ -101,7 +99,7 @@ def exit_on_faults() -> Iterator[None]:
 
 def show_warnings(warnings: Iterable[str]) -> None:
     """Print the warnings of a set-up, and what a missing cache of the kernels costs."""
-    from quad_nav.kernels.jit import cache_warnings  # here, because numba loads slowly
+    from quad_nav.files.kernel_cache import cache_warnings  # here, because numba loads slowly
 
     for warning in (*warnings, *cache_warnings()):
         echo(warning, err=True)

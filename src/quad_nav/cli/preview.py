@@ -26,8 +26,8 @@ _SHARED = ("scene", "goals", "config", "parameters", "robots", "size_m", "seed")
 @click.option(
     "--edit",
     is_flag=True,
-    help="Serve a page on this machine in which goals are dragged, added, removed and saved to the"
-    " goal files. Ctrl-C ends it.",
+    help="Serve the mission on a page in the browser of this machine, where goals are dragged,"
+    " added, removed and saved to the goal files. Ctrl-C ends it.",
 )
 def preview(**given: Any) -> None:
     """Show a mission before anything flies.

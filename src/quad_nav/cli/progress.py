@@ -21,7 +21,7 @@ from quad_nav.offline.flight import Flight, FlightObserver
 _PERIOD_S = 0.1  # wall time between two updates
 _SURE_AFTER_S = 10.0
 
-_STARTING = "starting (the first flight after an installation compiles kernels for 30 s)"
+_STARTING = "starting (the first flight after an installation compiles kernels for a minute)"
 
 
 def flights_progress(quiet: bool) -> Progress:

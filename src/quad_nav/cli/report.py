@@ -52,7 +52,7 @@ def report(
 ) -> None:
     """Write a report of a recorded flight, or compare several flights.
 
-    A FLIGHT is a bag or an MCAP file from quad fly --record, or a bag from rosbag record. The
+    A FLIGHT is a bag from quad fly --record or rosbag record. The
     report is a single HTML file that needs no network.
 
     Exit status: 0, 1 if something cannot be written, 2 for invalid input.

@@ -1,4 +1,4 @@
-"""move_base's YAML tree to parameters of the core; the only package with ROS spellings.
+"""move_base's YAML tree to dataclasses of the core, checked and complete.
 
     tree = load_files("config/tutorial", {"i": "0"})   # or rospy.get_param("~")
     configuration = load(tree, "/move_base0")          # InputError lists every fault
@@ -6,11 +6,12 @@
     configuration.remarks                              # unknown, unsupported and odd parameters
     updated(configuration, "TrajectoryPlannerROS", {"max_vel_x": 0.5})
 
-Reading order: ``spec`` (parameters and tables), ``tables`` (the tables), ``reader`` (check of a
-namespace), ``costmaps``, ``layers``, ``planners``, ``local_planners``, ``recoveries`` and ``fixes``
-(namespaces to dataclasses), ``configuration`` (the whole), ``reconfiguration`` (changes in flight),
-``files``, ``file_sets`` and ``robot_tree`` (YAML), ``check`` (the report of ``quad check``),
-``plugins`` (classes of users), ``reference`` (generates ``docs/parameters.md``).
+Parameters are declared in the dataclasses of their owners, see ``quad_nav.parameter``. Reading
+order: ``reader`` (the parameters of a namespace, and its check), ``costmaps``,
+``layers``, ``planners``, ``local_planners``, ``recoveries`` and ``fixes`` (namespaces to
+dataclasses), ``configuration`` (the whole), ``reconfiguration`` (changes in flight), ``files``,
+``file_sets`` and ``robot_tree`` (YAML), ``check`` (the report of ``quad check``), ``plugins``
+(classes of users), ``reference`` (generates ``docs/parameters.md``).
 
 The names above are imported when they are first used: ``load`` needs numba, reading files does not.
 """
@@ -22,7 +23,6 @@ from typing import Any
 
 _MODULES = {
     "Configuration": "configuration",
-    "Parameter": "spec",
     "Remark": "notes",
     "load": "configuration",
     "load_files": "files",
@@ -33,7 +33,6 @@ _MODULES = {
 
 __all__ = [  # noqa: F822
     "Configuration",
-    "Parameter",
     "Remark",
     "load",
     "load_files",

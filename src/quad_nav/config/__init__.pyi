@@ -7,4 +7,3 @@ from quad_nav.config.notes import Remark as Remark
 from quad_nav.config.reconfiguration import reconfigurable as reconfigurable
 from quad_nav.config.reconfiguration import updated as updated
 from quad_nav.config.reconfiguration import values as values
-from quad_nav.config.spec import Parameter as Parameter

@@ -6,37 +6,53 @@ import copy
 from dataclasses import dataclass, field, replace
 from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 
-from quad_nav.config.costmaps import costmap_params, normalise_costmap, remark_on_blindness
-from quad_nav.config.fixes import FIXES, FIXES_TABLE, with_fixes
+from quad_nav.config.costmaps import (
+    COSTMAP_TABLE,
+    costmap_params,
+    normalise_costmap,
+    remark_on_blindness,
+)
+from quad_nav.config.filters import (
+    COMMAND_FILTERS,
+    SCAN_FILTERS,
+    FilterType,
+    filter_names,
+    filters_of,
+    normalise_filters,
+)
+from quad_nav.config.fixes import GROUPS, normalise_groups, own_params, with_fixes
+from quad_nav.config.layers import LAYERS, SOURCE_TABLE, source_names
 from quad_nav.config.notes import CAUTION, MAPPED, OTHER_ROBOT, Notes, Remark, join
 from quad_nav.config.planners import (
+    SLOTS,
     local_planner_frequency,
     local_planner_period_s,
     normalise_planner_names,
     normalise_planners,
     planner_keys,
     planner_params,
+    planner_type,
 )
 from quad_nav.config.plugins import plugin_name
-from quad_nav.config.reader import fields, normalise, subtree
+from quad_nav.config.reader import Table, made, normalise
 from quad_nav.config.recoveries import (
+    TABLES,
     NamedTypes,
     RecoveryParams,
     circumscribed_radius_m,
+    full_type,
     listed_names,
     normalise_recoveries,
     recoveries,
 )
-from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
 from quad_nav.config.workload import rollout_problem, size_problem
-from quad_nav.control.surroundings import EvasionParams
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.errors import InputError
 from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.params import NavigatorParams
-from quad_nav.peers.coordinator import PeerParams
-from quad_nav.tracking.tracks import TrackerParams
+from quad_nav.parameter import POSITIVE, fixed_flag, fixed_number, fixed_whole
+from quad_nav.peers.peer_params import PeerParams
 
 COSTMAPS = ("global_costmap", "local_costmap")
 # Costmaps look for these upwards too, to the node's level.
@@ -51,12 +67,13 @@ class Configuration:
         global_planner: Parameters of the planner that ``navigator`` names: its dataclass, or a
             ``Plugin`` of the user's. The same holds for ``local_planner``.
         recoveries: (name, parameters) in the order in which they are tried.
+        scan_filters: (name, type) in their order.
+        command_filters: The same.
         local_planner_period_s: Control period that rollouts assume; as in move_base it may differ
             from the period of the control loop.
-        clearing_radius_m: Half the side of the square that ``make_plan`` clears around the robot.
-        body_radius_m: Radius of the simulated body; None for a quadcopter's own.
-        robot: Number of the robot among the ``robots`` that fly together.
-        robots: Number of these; 0 for those that are found on the ROS graph.
+        body_radius_m: None for a quadcopter's own.
+        robot: If unset, the number in the node's name, its frames or its topics.
+        robots: The peers are the other numbers below it; 0 for those on the ROS graph.
         remarks: Remarks on parameters that are legal and odd.
         tree: The normalised tree, with ROS spellings.
         tree_at_start: The tree that ``restore_defaults`` restores.
@@ -65,17 +82,27 @@ class Configuration:
     navigator: NavigatorParams
     peers: PeerParams
     scan_validator: ScanValidatorParams
-    tracker: TrackerParams
     global_costmap: CostmapParams
     local_costmap: CostmapParams
     global_planner: Any
     local_planner: Any
     recoveries: Tuple[Tuple[str, RecoveryParams], ...]
+    scan_filters: Tuple[Tuple[str, FilterType], ...]
+    command_filters: Tuple[Tuple[str, FilterType], ...]
     local_planner_period_s: float
-    clearing_radius_m: float
-    body_radius_m: Optional[float] = None
-    robot: int = 0
-    robots: int = 0
+    clearing_radius_m: float = fixed_number(
+        "clearing_radius", None, "metres", "Half the side of the square that make_plan clears."
+    )
+
+    # Our own
+    body_radius_m: Optional[float] = fixed_number(
+        "body_radius", None, "metres", "Radius of the simulated body.", POSITIVE, own=True
+    )
+    robot: int = fixed_whole("robot", 0, "Number of this robot in its fleet.", low=0, own=True)
+    robots: int = fixed_whole("robots", 0, "Number of robots that fly together.", low=0, own=True)
+    size_from_scene: bool = fixed_flag(
+        "size_from_scene", False, "The global costmap has the size of the scene.", own=True
+    )
     remarks: Tuple[Remark, ...] = ()
     tree: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     tree_at_start: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
@@ -96,6 +123,43 @@ class Configuration:
         Reconfigurable parameters have their value in force; others are there if they were set.
         """
         return copy.deepcopy(dict(self.tree))
+
+
+_OF_NODE = (NavigatorParams, ProgressParams, ScanValidatorParams, Configuration)
+MOVE_BASE_TABLE = Table(_OF_NODE, restores=True)
+
+
+def tables_of(tree: Mapping[str, Any]) -> Iterator[Tuple[str, Table, Mapping[str, Any]]]:
+    """Yield (path, parameters, namespace) of what is known of a normalised tree.
+
+    They are in the order of move_base's dynamic_reconfigure servers. Plugins are not known.
+    """
+    tables = {"": MOVE_BASE_TABLE}
+    for key in SLOTS:
+        planner = planner_type(tree, key) if key in tree else None
+        if planner is not None:
+            tables[plugin_name(tree[key])] = planner.table
+    for costmap in COSTMAPS:
+        tables[costmap] = COSTMAP_TABLE
+        for plugin in below(tree, costmap).get("plugins", ()):
+            layer = join(costmap, plugin["name"])
+            if plugin["type"] in LAYERS:
+                tables[layer] = LAYERS[plugin["type"]]
+                for source in source_names(below(tree, layer)):
+                    tables[join(layer, source)] = SOURCE_TABLE
+    for entry in tree.get("recovery_behaviors", ()):
+        if full_type(entry["type"]) in TABLES:
+            tables[entry["name"]] = TABLES[full_type(entry["type"])]
+    for path, table in {**tables, **GROUPS}.items():
+        yield path, table, below(tree, path)
+
+
+def below(tree: Mapping[str, Any], path: str) -> Any:
+    """Return the namespace at a path, {} if there is none."""
+    for name in filter(None, path.split("/")):
+        found = tree.get(name)
+        tree = found if isinstance(found, dict) else {}
+    return tree
 
 
 def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
@@ -144,21 +208,20 @@ def _made(
 ) -> Configuration:
     """Make the dataclasses of a normalised tree."""
     pruned = _without_empty(tree)
-    return Configuration(
+    return made(
+        Configuration,
+        tree,
         navigator=navigator_params(tree, listed, given),
-        peers=with_fixes(PeerParams(), tree),
-        scan_validator=with_fixes(ScanValidatorParams(), tree),
-        tracker=with_fixes(TrackerParams(), tree),
+        **own_parts(tree),
         global_costmap=costmap_params(tree, "global_costmap"),
         local_costmap=costmap_params(tree, "local_costmap"),
         global_planner=planner_params(tree, "base_global_planner"),
         local_planner=planner_params(tree, "base_local_planner"),
         recoveries=recoveries(tree, listed),
+        scan_filters=filters_of(tree, SCAN_FILTERS),
+        command_filters=filters_of(tree, COMMAND_FILTERS),
         local_planner_period_s=local_planner_period_s(tree),
         clearing_radius_m=tree.get("clearing_radius", circumscribed_radius_m(tree)),
-        body_radius_m=tree.get("body_radius"),
-        robot=tree.get("robot", 0),
-        robots=tree.get("robots", 0),
         tree=pruned,
         tree_at_start=pruned,
     )
@@ -174,13 +237,22 @@ def navigator_params(
         listed: (name, type) of the ``recovery_behaviors``, None without that list.
         given: The keys that were set.
     """
-    params = NavigatorParams(
+    params = made(
+        NavigatorParams,
+        tree,
+        given,
         recovery_behaviors=listed,
-        progress=with_fixes(ProgressParams(), tree),
-        evasion=with_fixes(EvasionParams(), tree),
-        **fields(tree, MOVE_BASE_TABLE.parameters, given),
+        progress=own_params(ProgressParams, tree),
     )
     return with_fixes(params, tree)
+
+
+def own_parts(tree: Mapping[str, Any]) -> Dict[str, Any]:
+    """Make the dataclasses of our own parameters that are fields of a ``Configuration``."""
+    return {
+        "peers": own_params(PeerParams, tree, "peers"),
+        "scan_validator": own_params(ScanValidatorParams, tree),
+    }
 
 
 def _normalise(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
@@ -188,16 +260,18 @@ def _normalise(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
     normalise_planner_names(tree, notes)
     known = [
         *COSTMAPS,
-        FIXES,
+        *GROUPS,
         OTHER_ROBOT,
         *planner_keys(tree),
         *_INHERITED,
         "recovery_behaviors",
         *listed_names(tree),
+        *filter_names(tree),
     ]
     normalise(tree, "", MOVE_BASE_TABLE, notes, also_known=known)
     normalise_planners(tree, notes)
-    normalise(subtree(tree, FIXES, "", notes), FIXES, FIXES_TABLE, notes)
+    normalise_groups(tree, notes)
+    normalise_filters(tree, notes)
     for name in COSTMAPS:
         normalise_costmap(tree, name, notes)
     return normalise_recoveries(tree, notes)

@@ -8,20 +8,20 @@ before ROS Hydro) layer parameters are among the costmap's own, and move_base mo
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Dict, List, Mapping, Set, Tuple
 
 from quad_nav.config.fixes import with_fixes
 from quad_nav.config.layers import LAYERS, PARENT_PARAMETERS, layer_params, normalise_layer
 from quad_nav.config.notes import CAUTION, IGNORED, UNSUPPORTED, Notes, join
 from quad_nav.config.plugins import PluginLayerParams, is_dotted
-from quad_nav.config.reader import Namespace, fields, normalise, subtree
-from quad_nav.config.spec import Table
-from quad_nav.config.tables.costmap import COSTMAP_TABLE
-from quad_nav.config.texts import polygon_from_list, text_from_polygon
+from quad_nav.config.reader import Namespace, Table, made, named_types, normalise, subtree
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
+from quad_nav.files.number_texts import polygon_from_list, text_from_polygon
 
+COSTMAP_TABLE = Table((CostmapParams,))
 OBSTACLE, VOXEL = "costmap_2d::ObstacleLayer", "costmap_2d::VoxelLayer"
 STATIC, INFLATION = "costmap_2d::StaticLayer", "costmap_2d::InflationLayer"
 _OLD_STYLE = ("static_map", "map_type")
@@ -66,7 +66,7 @@ def costmap_params(tree: Mapping[str, Any], name: str) -> CostmapParams:
         params = layer_params(costmap, name, plugin["name"], plugin["type"])
         if params is not None:
             layers.append((plugin["name"], with_fixes(params, tree)))
-    return CostmapParams(layers=tuple(layers), **fields(costmap, COSTMAP_TABLE.parameters))
+    return made(CostmapParams, costmap, layers=tuple(layers))
 
 
 def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:
@@ -174,32 +174,16 @@ def _move(costmap: Namespace, name: str, layer: str, key: str, notes: Notes, kee
 def _checked_plugins(costmap: Namespace, name: str, notes: Notes) -> List[Tuple[str, str]]:
     """Return (name, type) of each layer; report entries that are not supported."""
     place = join(name, "plugins")
-    plugins = costmap["plugins"]
-    if not isinstance(plugins, list):
-        notes.problem(place, f"{plugins!r} is not a list; expected a list of {{name: , type: }}")
-        return []
-    checked: List[Tuple[str, str]] = []
-    for entry in plugins:
-        if not isinstance(entry, dict) or not all(
-            isinstance(entry.get(key), str) for key in ("name", "type")
-        ):
-            notes.problem(place, f"{entry!r} is not a layer; expected {{name: , type: }}")
-        elif entry["name"] in dict(checked):
-            notes.problem(place, f"{entry['name']!r} is used twice; expected unique names")
-        else:
-            checked.append((entry["name"], entry["type"]))
-            _remark_on_type(join(place, entry["name"]), entry["type"], notes)
-    return checked
-
-
-def _remark_on_type(place: str, layer_type: str, notes: Notes) -> None:
-    if layer_type not in LAYERS and not is_dotted(layer_type):
-        notes.remark(
-            place,
-            UNSUPPORTED,
-            f"{layer_type} is not supported, skipping this layer; expected one of"
-            f" {', '.join(sorted(LAYERS))}",
-        )
+    plugins = named_types(costmap["plugins"], place, "a layer", notes)
+    for layer, layer_type in plugins.items():
+        if layer_type not in LAYERS and not is_dotted(layer_type):
+            notes.remark(
+                join(place, layer),
+                UNSUPPORTED,
+                f"{layer_type} is not supported, skipping this layer; expected one of"
+                f" {', '.join(sorted(LAYERS))}",
+            )
+    return list(plugins.items())
 
 
 def _table_with_misplaced(costmap: Namespace, known: Set[str]) -> Table:
@@ -215,5 +199,4 @@ def _table_with_misplaced(costmap: Namespace, known: Set[str]) -> Table:
     for key, value in costmap.items():
         if isinstance(value, dict) and key not in known:
             misplaced.setdefault(key, "plugins has no layer of this name")
-    base = COSTMAP_TABLE
-    return Table(base.reconfigurable, base.fixed, base.unsupported, tuple(misplaced.items()))
+    return replace(COSTMAP_TABLE, ignored=misplaced)

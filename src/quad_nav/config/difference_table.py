@@ -93,6 +93,8 @@ def _rows(tree: Any, number: str) -> List[ParameterRow]:
 
 def number_text(value: Any) -> str:
     """Return a parameter's value as text."""
+    if value is None:
+        return "unset"
     if isinstance(value, bool):
         return str(value).lower()
     return f"{value:g}" if isinstance(value, float) else str(value) or '""'

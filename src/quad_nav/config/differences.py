@@ -5,22 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Dict, Iterator, Mapping, Tuple
 
-from quad_nav.config.configuration import COSTMAPS
+from quad_nav.config.configuration import COSTMAPS, below, tables_of
 from quad_nav.config.files import ParameterTree, set_value
-from quad_nav.config.fixes import FIXES, FIXES_TABLE
-from quad_nav.config.layers import LAYERS
 from quad_nav.config.notes import join
-from quad_nav.config.planners import SLOTS, planner_type
-from quad_nav.config.plugins import plugin_name
-from quad_nav.config.recoveries import TABLES as RECOVERY_TABLES
-from quad_nav.config.recoveries import full_type
-from quad_nav.config.spec import Table
-from quad_nav.config.tables.costmap import COSTMAP_TABLE
-from quad_nav.config.tables.layers import SOURCE_TABLE
-from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
-from quad_nav.config.tables.recoveries import CLEAR_COSTMAP_TABLE
-
-Namespaced = Tuple[str, Table, Mapping[str, Any]]
+from quad_nav.config.reader import Table
+from quad_nav.config.recoveries import CLEAR, TABLES
 
 
 @dataclass(frozen=True)
@@ -43,13 +32,13 @@ def known_parameters(tree: Mapping[str, Any]) -> Dict[str, Any]:
         tree: A tree of ``Configuration.to_tree``.
     """
     known = ParameterTree()
-    for path, table, namespace in (*_namespaces(tree), *_default_recoveries(tree)):
-        lists = ("layer_names",) if table is CLEAR_COSTMAP_TABLE else ()
+    for path, table, namespace in (*tables_of(tree), *_default_recoveries(tree)):
+        lists = ("layer_names",) if table is TABLES[CLEAR] else ()
         for name in (*(parameter.name for parameter in table.parameters), *lists):
             if name in namespace:
                 set_value(known, join(path, name), namespace[name], "")
     for path, name in (("", "recovery_behaviors"), *((one, "plugins") for one in COSTMAPS)):
-        listed = (_below(tree, path) if path else tree).get(name)
+        listed = below(tree, path).get(name)
         if listed is not None:
             entries = [{"name": entry["name"], "type": entry["type"]} for entry in listed]
             set_value(known, join(path, name), entries, "")
@@ -67,7 +56,7 @@ def differences(tree: Mapping[str, Any]) -> Tuple[Difference, ...]:
     """
     return tuple(
         difference
-        for path, table, namespace in _namespaces(tree)
+        for path, table, namespace in tables_of(tree)
         for difference in _differences(path, table, namespace)
     )
 
@@ -80,40 +69,7 @@ def _differences(path: str, table: Table, namespace: Mapping[str, Any]) -> Itera
             yield Difference(join(path, parameter.name), value, parameter.in_force, unit)
 
 
-def _namespaces(tree: Mapping[str, Any]) -> Iterator[Namespaced]:
-    """Yield (path, table, parameters) of each namespace whose parameters are known."""
-    yield "", MOVE_BASE_TABLE, tree
-    for key in SLOTS:
-        planner = planner_type(tree, key) if key in tree else None
-        if planner is not None:
-            name = plugin_name(tree[key])
-            yield name, planner.table, _below(tree, name)
-    for costmap in COSTMAPS:
-        yield costmap, COSTMAP_TABLE, _below(tree, costmap)
-        yield from _layers(costmap, _below(tree, costmap))
-    for entry in tree.get("recovery_behaviors", ()):
-        table = RECOVERY_TABLES.get(full_type(entry["type"]))
-        if table is not None:
-            yield entry["name"], table, _below(tree, entry["name"])
-    yield FIXES, FIXES_TABLE, _below(tree, FIXES)
-
-
-def _default_recoveries(tree: Mapping[str, Any]) -> Iterator[Namespaced]:
+def _default_recoveries(tree: Mapping[str, Any]) -> Iterator[Tuple[str, Table, Mapping[str, Any]]]:
     if "recovery_behaviors" not in tree:
         for name in ("conservative_reset", "aggressive_reset"):
-            yield name, CLEAR_COSTMAP_TABLE, _below(tree, name)
-
-
-def _layers(path: str, costmap: Mapping[str, Any]) -> Iterator[Namespaced]:
-    for plugin in costmap.get("plugins", ()):
-        if plugin["type"] not in LAYERS:
-            continue
-        place, layer = join(path, plugin["name"]), _below(costmap, plugin["name"])
-        yield place, LAYERS[plugin["type"]].table, layer
-        for source in str(layer.get("observation_sources", "")).split():
-            yield join(place, source), SOURCE_TABLE, _below(layer, source)
-
-
-def _below(tree: Mapping[str, Any], name: str) -> Dict[str, Any]:
-    namespace = tree.get(name)
-    return namespace if isinstance(namespace, dict) else {}
+            yield name, TABLES[CLEAR], below(tree, name)

@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Set, Tuple
 
+from quad_nav.config.configuration import MOVE_BASE_TABLE
+from quad_nav.config.costmaps import COSTMAP_TABLE
 from quad_nav.config.files import (
     OPTIONAL,
     REQUIRED,
@@ -26,10 +28,8 @@ from quad_nav.config.files import (
     leaves,
     top_level,
 )
+from quad_nav.config.layers import LAYERS
 from quad_nav.config.planners import SLOTS, planner_keys
-from quad_nav.config.tables.costmap import COSTMAP_TABLE
-from quad_nav.config.tables.layers import INFLATION_LAYER_TABLE, OBSTACLE_LAYER_TABLE
-from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
 from quad_nav.errors import InputError
 
 _COSTMAPS = ("global_costmap", "local_costmap")
@@ -42,8 +42,8 @@ _OF_COSTMAP = {
     parameter.name
     for table in (
         COSTMAP_TABLE,
-        OBSTACLE_LAYER_TABLE,
-        INFLATION_LAYER_TABLE,
+        LAYERS["costmap_2d::ObstacleLayer"],
+        LAYERS["costmap_2d::InflationLayer"],
     )
     for parameter in table.parameters
 } | {"plugins", "map_type", "static_map"}

@@ -24,6 +24,8 @@ from quad_nav.files.user_files import read_text
 COMMON = "costmap_common_params"
 REQUIRED = (COMMON, "local_costmap_params", "global_costmap_params", "base_local_planner_params")
 OPTIONAL = ("move_base_params",)
+BASE = "default"
+"""Folder of the configuration that a file beside it is an overlay on."""
 COSTMAPS = ("global_costmap", "local_costmap")
 _NODE = re.compile(r"/?move_base(_node)?\d*")
 SUBSTITUTION = re.compile(r"\$\(([^()]*(?:\([^()]*\)[^()]*)*)\)")
@@ -155,17 +157,24 @@ def set_value(tree: ParameterTree, path: str, value: Any, origin: str) -> None:
     tree.origins["/".join(keys)] = origin
 
 
+def is_overlay(path: Path) -> bool:
+    """Tell if a file changes the configuration in the folder ``default`` beside it."""
+    return path.is_file() and (path.parent / BASE / f"{COMMON}.yaml").is_file()
+
+
 def files_of(folder: Path, number: Optional[str] = None, numbered: bool = False) -> List[Path]:
     """List the files of a robot in a folder, in the order of loading.
 
     Args:
-        folder: The folder.
+        folder: The folder, or an overlay on the one called ``default`` beside it.
         number: Number of the robot.
         numbered: Use only files with the robot's number in their names.
 
     Raises:
         InputError: The folder or one of the four files is missing.
     """
+    if is_overlay(folder):
+        return [*files_of(folder.parent / BASE, number, numbered), folder]
     if not folder.is_dir():
         raise InputError([f"{folder}: no such folder; expected a folder with {REQUIRED[0]}.yaml"])
     paths: List[Path] = []

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Tuple, Type
 
 from quad_nav.config.notes import CAUTION, Notes, join
 from quad_nav.config.plugins import LAYER, Parameters, PluginLayerParams, is_dotted, load_class
-from quad_nav.config.reader import Namespace, check_class, fields, inherited, normalise, subtree
-from quad_nav.config.spec import Table
-from quad_nav.config.tables.layers import (
-    ENABLED,
-    INFLATION_LAYER_TABLE,
-    OBSTACLE_LAYER_TABLE,
-    SOURCE_TABLE,
-    STATIC_LAYER_TABLE,
-    VOXEL_LAYER_TABLE,
-    VOXEL_PARAMETERS,
+from quad_nav.config.reader import (
+    Namespace,
+    Table,
+    check_class,
+    inherited,
+    made,
+    normalise,
+    subtree,
 )
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layer import LayerParams
@@ -24,12 +21,31 @@ from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.costmap.voxel import VoxelLayerParams
+from quad_nav.parameter import parameters_of
 
 Chain = Tuple[Tuple[str, Mapping[str, Any]], ...]
 _DATA_TYPES = ("LaserScan", "PointCloud", "PointCloud2")
 _RANGES = ("obstacle_range", "raytrace_range")
 # A longer expected_update_rate is probably meant as a rate.
 _LONG_PERIOD_S = 2.0
+
+# Parameters of a voxel layer that an obstacle layer lacks.
+_VOXELS = tuple(
+    parameter.name
+    for parameter in parameters_of(VoxelLayerParams)
+    if not hasattr(ObstacleLayerParams, parameter.field)
+)
+LAYERS: Dict[str, Table] = {
+    "costmap_2d::ObstacleLayer": Table(
+        (ObstacleLayerParams,),
+        ignored=dict.fromkeys(_VOXELS, "only a costmap_2d::VoxelLayer reads it"),
+    ),
+    "costmap_2d::VoxelLayer": Table((VoxelLayerParams,)),
+    "costmap_2d::InflationLayer": Table((InflationLayerParams,)),
+    "costmap_2d::StaticLayer": Table((StaticLayerParams,)),
+}
+"""Type of each supported layer -> its parameters."""
+SOURCE_TABLE = Table((SourceParams,))
 
 _OBSTACLES = ("max_obstacle_height", *_RANGES, "track_unknown_space")
 
@@ -41,18 +57,10 @@ PARENT_PARAMETERS: Dict[str, Tuple[str, ...]] = {
         "lethal_cost_threshold",
         "track_unknown_space",
     ),
-    "costmap_2d::VoxelLayer": VOXEL_PARAMETERS + _OBSTACLES,
+    "costmap_2d::VoxelLayer": _VOXELS + _OBSTACLES,
     "costmap_2d::ObstacleLayer": _OBSTACLES,
     "costmap_2d::InflationLayer": ("cost_scaling_factor", "inflation_radius"),
 }
-
-
-@dataclass(frozen=True)
-class LayerType:
-    """Type of layer: its table, and the function (costmap, name) that makes its dataclass."""
-
-    table: Table
-    params: Callable[[Mapping[str, Any], str], LayerParams]
 
 
 def normalise_layer(
@@ -73,11 +81,11 @@ def normalise_layer(
     if layer_type not in LAYERS:
         _normalise_plugin(layer, path, costmap_path, name, layer_type, notes)
         return
-    table = LAYERS[layer_type].table
-    if table not in (OBSTACLE_LAYER_TABLE, VOXEL_LAYER_TABLE):
+    table = LAYERS[layer_type]
+    if not issubclass(table.owners[0], ObstacleLayerParams):
         normalise(layer, path, table, notes)
         return
-    sources = _source_names(layer)
+    sources = source_names(layer)
     described = {key for key, value in layer.items() if isinstance(value, dict)}
     for source in sorted(described.difference(sources)):
         notes.remark(
@@ -96,7 +104,7 @@ def layer_params(
 ) -> Optional[LayerParams]:
     """Make a layer's dataclass from a normalised costmap; None if its type is not supported."""
     if layer_type in LAYERS:
-        return LAYERS[layer_type].params(costmap, name)
+        return _layer_params(LAYERS[layer_type].owners[0], costmap[name])
     if not is_dotted(layer_type):
         return None
     written = Parameters(costmap.get(name, {}), join(costmap_path, name))
@@ -111,11 +119,12 @@ def _normalise_plugin(
     layer: Namespace, path: str, costmap_path: str, name: str, layer_type: str, notes: Notes
 ) -> None:
     """Check a plugin's class and ``enabled``; it checks its other parameters itself."""
-    normalise(layer, path, Table(fixed=(ENABLED,)), notes, also_known=layer)
+    normalise(layer, path, Table((LayerParams,)), notes, also_known=layer)
     check_class(layer_type, LAYER, join(costmap_path, "plugins", name), notes)
 
 
-def _source_names(layer: Mapping[str, Any]) -> List[str]:
+def source_names(layer: Mapping[str, Any]) -> List[str]:
+    """Return the names of a layer's sources."""
     names = layer.get("observation_sources", "")
     return names.split() if isinstance(names, str) else []
 
@@ -150,49 +159,13 @@ def _inherit_ranges(layer: Namespace, path: str, chain: Chain, notes: Notes) -> 
             notes.moved(join(path, key), written_at)
 
 
-def _with_sources(table: Table, params: Callable[..., ObstacleLayerParams]) -> LayerType:
-    """Make the type of a layer with sources."""
-
-    def make(costmap: Mapping[str, Any], name: str) -> LayerParams:
-        layer = costmap[name]
-        arguments = fields(layer, table.parameters)
-        arguments["track_unknown_space"] = layer.get("track_unknown_space")
-        sources = tuple(
-            _source_params(layer.get(source, {}), source) for source in _source_names(layer)
-        )
-        return params(sources=sources, **arguments)
-
-    return LayerType(table, make)
+def _layer_params(owner: Type[LayerParams], layer: Mapping[str, Any]) -> LayerParams:
+    if not issubclass(owner, ObstacleLayerParams):
+        return made(owner, layer)
+    names = source_names(layer)
+    sources = tuple(_source_params(layer.get(source, {}), source) for source in names)
+    return made(owner, layer, sources=sources)
 
 
 def _source_params(source: Mapping[str, Any], name: str) -> SourceParams:
-    arguments = fields(source, SOURCE_TABLE.parameters)
-    arguments["topic"] = arguments["topic"] or name
-    for parameter in SOURCE_TABLE.fixed:
-        if parameter.name in _RANGES:
-            arguments[parameter.field] = source.get(parameter.name)
-    return SourceParams(name=name, **arguments)
-
-
-def _plain(table: Table, params: Callable[..., LayerParams]) -> LayerType:
-    def make(costmap: Mapping[str, Any], name: str) -> LayerParams:
-        return params(**fields(costmap[name], table.parameters))
-
-    return LayerType(table, make)
-
-
-LAYERS: Dict[str, LayerType] = {
-    "costmap_2d::ObstacleLayer": _with_sources(OBSTACLE_LAYER_TABLE, ObstacleLayerParams),
-    "costmap_2d::VoxelLayer": _with_sources(VOXEL_LAYER_TABLE, VoxelLayerParams),
-    "costmap_2d::InflationLayer": _plain(INFLATION_LAYER_TABLE, InflationLayerParams),
-    "costmap_2d::StaticLayer": _plain(STATIC_LAYER_TABLE, StaticLayerParams),
-}
-
-
-def layer_tables(plugins: Iterable[Mapping[str, str]]) -> Dict[str, Table]:
-    """Return name -> table of the supported layers."""
-    return {
-        plugin["name"]: LAYERS[plugin["type"]].table
-        for plugin in plugins
-        if plugin["type"] in LAYERS
-    }
+    return made(SourceParams, source, name=name, topic=source.get("topic") or name)

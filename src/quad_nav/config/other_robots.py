@@ -16,13 +16,12 @@ from quad_nav.config.files import COSTMAPS, ParameterTree, set_value
 from quad_nav.config.layers import LAYERS
 from quad_nav.config.notes import CAUTION, LEFT_OUT, MAPPED, Remark
 from quad_nav.config.plugins import is_dotted, plugin_name
-from quad_nav.config.tables.costmap import COSTMAP_TABLE
-from quad_nav.config.tables.move_base import DEFAULT_GLOBAL_PLANNER, DEFAULT_LOCAL_PLANNER
-from quad_nav.config.texts import polygon_from_list, polygon_from_text
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.files.number_texts import polygon_from_list, polygon_from_text
 from quad_nav.footprint import radii
+from quad_nav.navigator.params import DEFAULT_GLOBAL_PLANNER, DEFAULT_LOCAL_PLANNER
 
 _OWN_NAME = re.compile(r"/*(?:odom|base_link|Lidar|scan)(\d+)")
 _OWN_TOPICS = ("scan", "/scan")  # move_base{i} has a remap from /scan to /scan{i}
@@ -159,14 +158,13 @@ class _Fit:
         return costmap if isinstance(costmap, dict) else {}  # a fault that ``load`` reports
 
     def _map_frames(self, costmap: Dict[str, Any]) -> None:
-        default = COSTMAP_TABLE["global_frame"].default
-        frame = costmap.get("global_frame", default)
+        frame = costmap.get("global_frame", CostmapParams.global_frame)
         if isinstance(frame, str):
             is_odometry = "odom" in frame.rpartition("/")[2]
             costmap["global_frame"] = self._frame(
                 frame, f"odom{self._number}" if is_odometry else "map"
             )
-        frame = costmap.get("robot_base_frame", COSTMAP_TABLE["robot_base_frame"].default)
+        frame = costmap.get("robot_base_frame", CostmapParams.robot_base_frame)
         if isinstance(frame, str):
             costmap["robot_base_frame"] = self._frame(frame, f"base_link{self._number}")
 
@@ -306,8 +304,8 @@ class _Fit:
             )
         except ValueError:  # a fault that ``load`` reports
             return None
-        default = COSTMAP_TABLE["robot_radius"].default
-        radius_m = costmap.get("robot_radius", self.tree.get("robot_radius", default))
+        default_m = CostmapParams.robot_radius_m
+        radius_m = costmap.get("robot_radius", self.tree.get("robot_radius", default_m))
         if polygon is not None:
             radius_m = radii(polygon)[0]
         if isinstance(radius_m, bool) or not isinstance(radius_m, (int, float)):

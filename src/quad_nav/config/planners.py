@@ -11,7 +11,10 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
 
 from quad_nav.config.fixes import with_fixes
 from quad_nav.config.local_planners import (
+    DWA_TABLE,
+    LATCH,
     TRAJECTORY_PLANNER,
+    TRAJECTORY_PLANNER_TABLE,
     dwa_params,
     normalise_dwa,
     normalise_trajectory_planner,
@@ -28,17 +31,27 @@ from quad_nav.config.plugins import (
     load_class,
     plugin_name,
 )
-from quad_nav.config.reader import Namespace, check_class, fields, normalise, subtree
-from quad_nav.config.spec import Table
-from quad_nav.config.tables.dwa_planner import DWA_TABLE, LATCH
-from quad_nav.config.tables.global_planners import CARROT_TABLE, GLOBAL_PLANNER_TABLE, NAVFN_TABLE
-from quad_nav.config.tables.move_base import DEFAULT_GLOBAL_PLANNER, DEFAULT_LOCAL_PLANNER
-from quad_nav.config.tables.recoveries import ROTATE_FROM_PLANNER
-from quad_nav.config.tables.trajectory_planner import TRAJECTORY_PLANNER_TABLE
+from quad_nav.config.reader import Namespace, Table, check_class, made, normalise, subtree
+from quad_nav.navigator.params import DEFAULT_GLOBAL_PLANNER, DEFAULT_LOCAL_PLANNER
 from quad_nav.plan.carrot import CarrotParams
 from quad_nav.plan.global_planner import SearchPlannerParams
 from quad_nav.plan.navfn import NavfnParams
+from quad_nav.recovery import TurnLimits
 
+_UNUSED = "read and never used"
+NAVFN_TABLE = Table((NavfnParams,))
+GLOBAL_PLANNER_TABLE = Table(
+    (SearchPlannerParams,),
+    ignored={
+        "default_tolerance": _UNUSED,
+        "planner_window_x": _UNUSED,
+        "planner_window_y": _UNUSED,
+        "visualize_potential": "the name is publish_potential",
+    },
+)
+CARROT_TABLE = Table(
+    (CarrotParams,), ignored={"step_size": _UNUSED, "min_dist_from_robot": _UNUSED}
+)
 SEARCH_PLANNER = "global_planner/GlobalPlanner"
 CARROT = "carrot_planner/CarrotPlanner"
 DWA_PLANNER = "dwa_local_planner/DWAPlannerROS"
@@ -61,20 +74,20 @@ class PlannerType:
     inherited: Tuple[str, ...] = ()
 
 
-def _plain(plugin: str, table: Table, params: Callable[..., Any]) -> PlannerType:
+def _plain(plugin: str, table: Table) -> PlannerType:
     """Make the type of a planner whose namespace holds the table's parameters only."""
     name = plugin_name(plugin)
     return PlannerType(
         table,
         normalise=lambda tree, notes: normalise(subtree(tree, name, "", notes), name, table, notes),
-        params=lambda tree: params(**fields(tree.get(name, {}), table.parameters)),
+        params=lambda tree: made(table.owners[0], tree.get(name, {})),
     )
 
 
 GLOBAL_PLANNERS: Dict[str, PlannerType] = {
-    DEFAULT_GLOBAL_PLANNER: _plain(DEFAULT_GLOBAL_PLANNER, NAVFN_TABLE, NavfnParams),
-    SEARCH_PLANNER: _plain(SEARCH_PLANNER, GLOBAL_PLANNER_TABLE, SearchPlannerParams),
-    CARROT: _plain(CARROT, CARROT_TABLE, CarrotParams),
+    DEFAULT_GLOBAL_PLANNER: _plain(DEFAULT_GLOBAL_PLANNER, NAVFN_TABLE),
+    SEARCH_PLANNER: _plain(SEARCH_PLANNER, GLOBAL_PLANNER_TABLE),
+    CARROT: _plain(CARROT, CARROT_TABLE),
 }
 LOCAL_PLANNERS: Dict[str, PlannerType] = {
     DEFAULT_LOCAL_PLANNER: PlannerType(
@@ -178,19 +191,6 @@ def planner_params(tree: Mapping[str, Any], key: str) -> Any:
     return Plugin(load_class(tree[key], interface), parameters, interface.methods_of)
 
 
-def reconfigurable_planners(tree: Mapping[str, Any]) -> Dict[str, Table]:
-    """Return namespace -> table of the chosen planners with reconfigurable parameters.
-
-    The local planner comes first.
-    """
-    found = {}
-    for key in SLOTS:
-        own = planner_type(tree, key)
-        if own is not None and own.table.reconfigurable:
-            found[plugin_name(tree[key])] = own.table
-    return found
-
-
 def local_planner_frequency(tree: Mapping[str, Any]) -> Any:
     """Return the local planner's own ``controller_frequency``, None if it has none."""
     key = "base_local_planner"
@@ -213,6 +213,6 @@ def local_planner_period_s(tree: Mapping[str, Any]) -> float:
 def _normalise_unused(tree: Namespace, name: str, reason: str, notes: Notes) -> None:
     if name == TRAJECTORY_PLANNER:
         planner = subtree(tree, name, "", notes)
-        normalise(planner, name, Table(fixed=ROTATE_FROM_PLANNER), notes, also_known=planner)
+        normalise(planner, name, Table((TurnLimits,)), notes, also_known=planner)
         reason += "; rotate_recovery still reads its limits"
     notes.remark(name, UNUSED, reason)

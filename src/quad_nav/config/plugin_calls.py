@@ -17,8 +17,10 @@ import numpy as np
 
 from quad_nav.control.controller import Control
 from quad_nav.costmap.cost_grid import Bounds
+from quad_nav.costmap.scan_filter import FilteredScan
 from quad_nav.errors import ControlError, InputError, PlanningError, PluginError
 from quad_nav.geometry import Twist2D
+from quad_nav.navigator.command_filter import Command
 from quad_nav.recovery import Step
 
 _ALLOWED: Dict[str, Tuple[Type[Exception], ...]] = {
@@ -143,6 +145,14 @@ def _described(value: Any) -> str:
     return "None" if value is None else f"{type(value).__name__} {str(value)[:60]}"
 
 
+def _wrong_filtered(value: Any) -> str:
+    if isinstance(value, Command):
+        return _wrong_twist(value.velocity)
+    if isinstance(value, FilteredScan):
+        return ""
+    return f"{_described(value)}; expected the Command or the FilteredScan, changed or not"
+
+
 _WRONG: Dict[str, Callable[[Any], str]] = {
     "make_plan": lambda value: _wrong_array(value, 3, least=1),
     "compute_velocity": _wrong_control,
@@ -150,6 +160,7 @@ _WRONG: Dict[str, Callable[[Any], str]] = {
     "cost_cloud": lambda value: _wrong_array(value, 7),
     "update_bounds": _wrong_kind(Bounds),
     "step": _wrong_step,
+    "filter": _wrong_filtered,
     "period_s": _wrong_kind(float, int, np.floating),
 }
 """Checks of results by method; each returns the fault, "" without one."""

@@ -1,4 +1,4 @@
-"""Plugins: planners, costmap layers and recoveries of users.
+"""Plugins: planners, costmap layers, recoveries and filters of users.
 
 Where move_base expects the name of a plugin, a dotted Python name such as
 ``my_package.my_module.MyPlanner`` loads a class. An ``Interface`` says what the class needs;
@@ -16,8 +16,10 @@ from typing import Any, Dict, Iterator, Mapping, Tuple
 from quad_nav.config.plugin_calls import call_constructor
 from quad_nav.control.controller import LocalPlanner
 from quad_nav.costmap.layer import Layer, LayerParams
+from quad_nav.costmap.scan_filter import ScanFilter
 from quad_nav.errors import InputError
 from quad_nav.grid import GridSpec
+from quad_nav.navigator.command_filter import CommandFilter
 from quad_nav.plan.planner import GlobalPlanner
 from quad_nav.recovery import Recovery
 
@@ -47,6 +49,8 @@ LAYER = Interface(
     "a costmap layer", Layer, ("params", "spec", "rolling_window", "default_cost"), derived=True
 )
 RECOVERY = Interface("a recovery behaviour", Recovery, ("params",))
+SCAN_FILTER = Interface("a scan filter", ScanFilter, ("params",), derived=True)
+COMMAND_FILTER = Interface("a command filter", CommandFilter, ("params",), derived=True)
 
 
 class Parameters(Dict[str, Any]):

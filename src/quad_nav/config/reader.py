@@ -7,12 +7,67 @@ made from normalised namespaces, which hold no faults.
 
 from __future__ import annotations
 
-from typing import Any, Dict, Iterable, Mapping, Tuple
+from dataclasses import dataclass, field
+from typing import Any, Dict, Iterable, Mapping, Tuple, Type, TypeVar, cast
 
 from quad_nav.config.notes import CLAMPED, IGNORED, UNSUPPORTED, Notes, join
 from quad_nav.config.plugins import Interface, load_class
-from quad_nav.config.spec import InvalidValue, Parameter, Table
 from quad_nav.errors import InputError
+from quad_nav.parameter import InvalidValue, Parameter, parameters_of
+
+_Params = TypeVar("_Params")
+RESTORE_DEFAULTS = Parameter(
+    "restore_defaults", "bool", False, "Restore to the original configuration."
+)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Parameters of one namespace.
+
+    Attributes:
+        owners: Dataclasses that declare the parameters; a parameter of several owners is one.
+        restores: True if dynamic_reconfigure can restore the namespace.
+        is_own: True if upstream has no such namespace.
+        unsupported: Name -> reason of keys that move_base reads and this package does not.
+        ignored: Name -> reason of keys that move_base ignores too.
+    """
+
+    owners: Tuple[type, ...]
+    restores: bool = False
+    is_own: bool = False
+    unsupported: Mapping[str, str] = field(default_factory=dict)
+    ignored: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def reconfigurable(self) -> Tuple[Parameter, ...]:
+        """Parameters that can change in flight: upstream's in its order, then our own."""
+        found = [one for one in self._declared() if not one.is_fixed]
+        first = [one for one in found if self.is_own or not one.is_own]
+        added = [one for one in found if one.is_own and not self.is_own]
+        restore = [RESTORE_DEFAULTS] if self.restores else []
+        return (*first, *restore, *added)
+
+    @property
+    def fixed(self) -> Tuple[Parameter, ...]:
+        """Parameters that are read once, at the start."""
+        return tuple(one for one in self._declared() if one.is_fixed)
+
+    @property
+    def parameters(self) -> Tuple[Parameter, ...]:
+        """All parameters, the reconfigurable ones first."""
+        return self.reconfigurable + self.fixed
+
+    def __getitem__(self, name: str) -> Parameter:
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
+        raise KeyError(name)
+
+    def _declared(self) -> Tuple[Parameter, ...]:
+        found = {one.name: one for owner in self.owners for one in parameters_of(owner)}
+        return tuple(found.values())
+
 
 Namespace = Dict[str, Any]
 
@@ -64,36 +119,34 @@ def _remark_on_other_keys(
         if key in names:
             continue
         place = join(path, str(key))
-        if key in dict(table.unsupported):
-            reason = dict(table.unsupported)[key]
+        if key in table.unsupported:
+            reason = table.unsupported[key]
             notes.remark(place, UNSUPPORTED, f"not supported by this package: {reason}")
-        elif key in dict(table.ignored):
-            notes.remark(place, IGNORED, f"ignored by move_base: {dict(table.ignored)[key]}")
+        elif key in table.ignored:
+            notes.remark(place, IGNORED, f"ignored by move_base: {table.ignored[key]}")
         else:
             notes.unknown(place, str(key), names)
 
 
-def fields(
-    namespace: Mapping[str, Any], parameters: Iterable[Parameter], given: Iterable[str] = ()
-) -> Dict[str, Any]:
-    """Return the arguments of a dataclass from a normalised namespace.
+def made(
+    owner: Type[_Params], namespace: Mapping[str, Any], given: Iterable[str] = (), **others: Any
+) -> _Params:
+    """Make a dataclass from a normalised namespace.
 
     Args:
-        namespace: The normalised namespace.
-        parameters: The parameters that fill fields of the dataclass.
-        given: Names that were set. The others have their ``initial`` value, where the table has
-            one, until the first reconfiguration.
+        owner: The dataclass, which declares the parameters.
+        namespace: The normalised namespace; what it lacks has its default.
+        given: Names that were set. The others have their ``initial`` value, where they have one,
+            until the first reconfiguration.
+        others: Fields with other values than the namespace's.
     """
     given = set(given)
-    arguments = {}
-    for parameter in parameters:
-        if not parameter.field:
-            continue
-        value = namespace.get(parameter.name, parameter.in_force)
-        if parameter.initial is not None and parameter.name not in given:
-            value = parameter.initial
-        arguments[parameter.field] = parameter.field_value(value)
-    return arguments
+    arguments = {
+        parameter.field: parameter.field_value(namespace[parameter.name])
+        for parameter in parameters_of(cast(type, owner))
+        if parameter.name in namespace and (parameter.initial is None or parameter.name in given)
+    }
+    return owner(**{**arguments, **others})
 
 
 def subtree(tree: Namespace, name: str, path: str, notes: Notes) -> Namespace:
@@ -105,6 +158,31 @@ def subtree(tree: Namespace, name: str, path: str, notes: Notes) -> Namespace:
         notes.problem(join(path, name), f"{value!r} is a value; expected a namespace of parameters")
         value = tree[name] = {}
     return value
+
+
+def named_types(entries: Any, place: str, kind: str, notes: Notes) -> Dict[str, str]:
+    """Return name -> type of a list of ``{name: , type: }``; report entries of another form.
+
+    Args:
+        entries: The list, as it was written.
+        place: Path of the list.
+        kind: What an entry names, with its article, for messages.
+        notes: Receives faults.
+    """
+    expected = "expected {name: , type: }"
+    if not isinstance(entries, list):
+        notes.problem(place, f"{entries!r} is not a list; expected a list of {{name: , type: }}")
+        return {}
+    found: Dict[str, str] = {}
+    for entry in entries:
+        words = (entry.get("name"), entry.get("type")) if isinstance(entry, dict) else ()
+        if not words or not all(isinstance(word, str) for word in words):
+            notes.problem(place, f"{entry!r} is not {kind}; {expected}")
+        elif entry["name"] in found:
+            notes.problem(place, f"{entry['name']!r} is used twice; expected unique names")
+        else:
+            found[entry["name"]] = entry["type"]
+    return found
 
 
 def check_class(name: str, interface: Interface, place: str, notes: Notes) -> None:

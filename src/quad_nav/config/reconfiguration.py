@@ -7,20 +7,18 @@ from dataclasses import replace
 from typing import Any, Dict, List, Mapping, Tuple
 
 from quad_nav.config.configuration import (
-    COSTMAPS,
     Configuration,
+    below,
     navigator_params,
+    own_parts,
+    tables_of,
     workload_problems,
 )
 from quad_nav.config.costmaps import costmap_params
-from quad_nav.config.fixes import FIXES, FIXES_TABLE, with_fixes
-from quad_nav.config.layers import layer_tables
 from quad_nav.config.notes import join
-from quad_nav.config.planners import SLOTS, planner_params, reconfigurable_planners
-from quad_nav.config.spec import InvalidValue, Parameter
-from quad_nav.config.tables.costmap import COSTMAP_TABLE
-from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
+from quad_nav.config.planners import SLOTS, planner_params
 from quad_nav.errors import InputError
+from quad_nav.parameter import InvalidValue, Parameter
 
 _GROUPS = "groups"  # dynamic_reconfigure's own bookkeeping among the values
 _RESTORE = "restore_defaults"
@@ -31,18 +29,16 @@ def reconfigurable(configuration: Configuration) -> Dict[str, Tuple[Parameter, .
 
     Namespaces are relative to the node; "" is move_base itself.
     """
-    namespaces = {"": MOVE_BASE_TABLE, **reconfigurable_planners(configuration.tree)}
-    for costmap in COSTMAPS:
-        namespaces[costmap] = COSTMAP_TABLE
-        for layer, table in layer_tables(configuration.tree[costmap]["plugins"]).items():
-            namespaces[join(costmap, layer)] = table
-    namespaces[FIXES] = FIXES_TABLE
-    return {name: table.reconfigurable for name, table in namespaces.items()}
+    return {
+        path: table.reconfigurable
+        for path, table, _ in tables_of(configuration.tree)
+        if table.reconfigurable
+    }
 
 
 def values(configuration: Configuration, namespace: str) -> Dict[str, Any]:
     """Return the ROS values in force of a namespace's reconfigurable parameters."""
-    normalised = _below(configuration.tree, namespace)
+    normalised = below(configuration.tree, namespace)
     return {
         parameter.name: normalised[parameter.name]
         for parameter in reconfigurable(configuration)[namespace]
@@ -71,10 +67,10 @@ def updated(
         raise InputError([f"{namespace}: not reconfigurable; expected one of {names}"])
     checked = _checked(parameters, namespace, changes, configuration.tree)
     if checked.get(_RESTORE):
-        start = _below(configuration.tree_at_start, namespace)
+        start = below(configuration.tree_at_start, namespace)
         checked = {parameter.name: start[parameter.name] for parameter in parameters}
     tree = copy.deepcopy(dict(configuration.tree))
-    _below(tree, namespace).update(checked)
+    below(tree, namespace).update(checked)
     changed = _remade(replace(configuration, tree=tree), namespace)
     problems = [f"{name}: {problem}" for name, problem in workload_problems(changed)]
     if problems:
@@ -119,46 +115,18 @@ def _clamped(parameter: Parameter, value: Any) -> Any:
 
 
 def _remade(configuration: Configuration, namespace: str) -> Configuration:
-    """The dataclass of that namespace from the tree; the others stay as they are."""
-    tree = configuration.tree
-    if namespace == "":
-        listed = configuration.navigator.recovery_behaviors
-        return replace(configuration, navigator=navigator_params(tree, listed, given=tree))
-    if namespace == FIXES:
-        return _with_other_fixes(configuration)
-    if namespace in reconfigurable_planners(tree):
-        return replace(
-            configuration,
-            global_planner=planner_params(tree, "base_global_planner"),
-            local_planner=planner_params(tree, "base_local_planner"),
-        )
-    costmap = namespace.split("/")[0]
-    params = costmap_params(tree, costmap)
-    if costmap == "global_costmap":
-        return replace(configuration, global_costmap=params)
-    return replace(configuration, local_costmap=params)
-
-
-def _with_other_fixes(configuration: Configuration) -> Configuration:
-    """Set the switches anew in every part that may change in flight: recoveries may not."""
-    tree, navigator = configuration.tree, configuration.navigator
+    """Make the parts that may change in flight anew from the tree; recoveries may not."""
+    tree, before = configuration.tree, configuration.navigator
+    navigator = navigator_params(tree, before.recovery_behaviors, given=tree)
+    if namespace:  # move_base itself is not reconfigured
+        patience_s = before.controller_patience_s
+        navigator = replace(navigator, controller_patience_s=patience_s)
     return replace(
         configuration,
-        navigator=replace(
-            with_fixes(navigator, tree),
-            progress=with_fixes(navigator.progress, tree),
-            evasion=with_fixes(navigator.evasion, tree),
-        ),
-        peers=with_fixes(configuration.peers, tree),
-        scan_validator=with_fixes(configuration.scan_validator, tree),
-        tracker=with_fixes(configuration.tracker, tree),
-        local_planner=with_fixes(configuration.local_planner, tree),
+        navigator=navigator,
+        global_planner=planner_params(tree, "base_global_planner"),
+        local_planner=planner_params(tree, "base_local_planner"),
         global_costmap=costmap_params(tree, "global_costmap"),
         local_costmap=costmap_params(tree, "local_costmap"),
+        **own_parts(tree),
     )
-
-
-def _below(tree: Mapping[str, Any], namespace: str) -> Any:
-    for name in filter(None, namespace.split("/")):
-        tree = tree[name]
-    return tree

@@ -8,17 +8,23 @@ from quad_nav.config.fixes import with_fixes
 from quad_nav.config.local_planners import TRAJECTORY_PLANNER
 from quad_nav.config.notes import CAUTION, IGNORED, UNSUPPORTED, Notes, join
 from quad_nav.config.plugins import RECOVERY, Parameters, Plugin, is_dotted, load_class
-from quad_nav.config.reader import Namespace, check_class, fields, normalise, subtree
-from quad_nav.config.spec import Table
-from quad_nav.config.speed_limits import check_slow, slow_params
-from quad_nav.config.tables.costmap import COSTMAP_TABLE
-from quad_nav.config.tables.recoveries import (
-    CLEAR_COSTMAP_TABLE,
-    MOVE_SLOW_TABLE,
-    ROTATE_FROM_PLANNER,
-    ROTATE_TABLE,
+from quad_nav.config.reader import (
+    Namespace,
+    Table,
+    check_class,
+    made,
+    named_types,
+    normalise,
+    subtree,
 )
-from quad_nav.recovery import ClearCostmapParams, MoveSlowAndClearParams, RotateParams
+from quad_nav.config.speed_limits import check_slow, slow_params
+from quad_nav.costmap.layered import CostmapParams
+from quad_nav.recovery import (
+    ClearCostmapParams,
+    MoveSlowAndClearParams,
+    RotateParams,
+    TurnLimits,
+)
 
 RecoveryParams = Union[ClearCostmapParams, RotateParams, MoveSlowAndClearParams, Plugin]
 NamedTypes = Tuple[Tuple[str, str], ...]
@@ -27,9 +33,9 @@ CLEAR = "clear_costmap_recovery/ClearCostmapRecovery"
 ROTATE = "rotate_recovery/RotateRecovery"
 MOVE_SLOW = "move_slow_and_clear/MoveSlowAndClear"
 TABLES: Dict[str, Table] = {
-    CLEAR: CLEAR_COSTMAP_TABLE,
-    ROTATE: ROTATE_TABLE,
-    MOVE_SLOW: MOVE_SLOW_TABLE,
+    CLEAR: Table((ClearCostmapParams,)),
+    ROTATE: Table((RotateParams,)),
+    MOVE_SLOW: Table((MoveSlowAndClearParams,)),
 }
 _CONSERVATIVE, _AGGRESSIVE, _ROTATE = "conservative_reset", "aggressive_reset", "rotate_recovery"
 _AFFECTED_MAPS = ("local", "global", "both")
@@ -71,7 +77,7 @@ def recoveries(
 def circumscribed_radius_m(tree: Mapping[str, Any]) -> float:
     """Return move_base's circumscribed radius: its own parameter, not the footprint's."""
     costmap = tree["local_costmap"]
-    return costmap.get("circumscribed_radius", COSTMAP_TABLE["circumscribed_radius"].default)
+    return costmap.get("circumscribed_radius", CostmapParams.circumscribed_radius_m)
 
 
 def _default_sequence(tree: Mapping[str, Any]) -> NamedTypes:
@@ -103,26 +109,8 @@ def _listed(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
     if "recovery_behaviors" not in tree:
         return None
     entries = tree["recovery_behaviors"]
-    if not isinstance(entries, list):
-        notes.problem(
-            "recovery_behaviors",
-            f"{entries!r} is not a list; expected a list of {{name: , type: }}",
-        )
-        return ()
-    listed: Dict[str, str] = {}
-    for entry in entries:
-        if not isinstance(entry, dict) or not all(
-            isinstance(entry.get(key), str) for key in ("name", "type")
-        ):
-            notes.problem(
-                "recovery_behaviors", f"{entry!r} is not a behaviour; expected {{name: , type: }}"
-            )
-        elif entry["name"] in listed:
-            notes.problem(
-                "recovery_behaviors", f"{entry['name']!r} is used twice; expected unique names"
-            )
-        else:
-            listed[entry["name"]] = full_type(entry["type"])
+    listed = named_types(entries, "recovery_behaviors", "a behaviour", notes)
+    listed = {name: full_type(kind) for name, kind in listed.items()}
     for name in [name for name, kind in listed.items() if kind not in TABLES]:
         if is_dotted(listed[name]):
             check_class(listed[name], RECOVERY, join("recovery_behaviors", name), notes)
@@ -157,7 +145,7 @@ def _normalise_clearing(namespace: Namespace, name: str, notes: Notes) -> None:
     """Check layers; upstream takes an unknown word of ``affected_maps`` for both."""
     maps = namespace.get("affected_maps", "both")
     if isinstance(maps, str) and maps not in _AFFECTED_MAPS:
-        expected = CLEAR_COSTMAP_TABLE["affected_maps"].expected
+        expected = TABLES[CLEAR]["affected_maps"].expected
         notes.remark(
             join(name, "affected_maps"), CAUTION, f"{maps!r} clears both; expected {expected}"
         )
@@ -173,23 +161,12 @@ def _normalise_clearing(namespace: Namespace, name: str, notes: Notes) -> None:
 def _params(name: str, kind: str, tree: Mapping[str, Any]) -> RecoveryParams:
     namespace = tree.get(name, {})
     if kind == CLEAR:
-        return _clear_params(namespace)
+        names = namespace.get("layer_names")
+        layers = None if names is None else tuple(names)
+        return made(ClearCostmapParams, namespace, layer_names=layers)
     if kind == MOVE_SLOW:
         return slow_params(namespace, tree["base_local_planner"])
     if kind == ROTATE:
-        return _rotate_params(namespace, tree.get(TRAJECTORY_PLANNER, {}))
+        limits = made(TurnLimits, tree.get(TRAJECTORY_PLANNER, {}))
+        return made(RotateParams, namespace, limits=limits)
     return Plugin(load_class(kind, RECOVERY), Parameters(namespace, name), RECOVERY.methods_of)
-
-
-def _clear_params(namespace: Mapping[str, Any]) -> ClearCostmapParams:
-    names = namespace.get("layer_names")
-    return ClearCostmapParams(
-        layer_names=None if names is None else tuple(names),
-        **fields(namespace, CLEAR_COSTMAP_TABLE.parameters),
-    )
-
-
-def _rotate_params(namespace: Mapping[str, Any], planner: Mapping[str, Any]) -> RotateParams:
-    return RotateParams(
-        **fields(namespace, ROTATE_TABLE.parameters), **fields(planner, ROTATE_FROM_PLANNER)
-    )

@@ -1,4 +1,4 @@
-"""Generate ``docs/parameters.md`` from the tables of parameters.
+"""Generate ``docs/parameters.md`` from the declarations of the parameters.
 
 python -m quad_nav.config.reference > docs/parameters.md
 """
@@ -7,37 +7,34 @@ from __future__ import annotations
 
 from typing import List, Tuple
 
-from quad_nav.config.fixes import FIXES_TABLE
-from quad_nav.config.spec import Parameter, Table
-from quad_nav.config.tables.costmap import COSTMAP_TABLE
-from quad_nav.config.tables.dwa_planner import DWA_TABLE
-from quad_nav.config.tables.global_planners import CARROT_TABLE, GLOBAL_PLANNER_TABLE, NAVFN_TABLE
-from quad_nav.config.tables.layers import (
-    INFLATION_LAYER_TABLE,
-    OBSTACLE_LAYER_TABLE,
-    SOURCE_TABLE,
-    STATIC_LAYER_TABLE,
-    VOXEL_LAYER_TABLE,
+from quad_nav.config.configuration import MOVE_BASE_TABLE
+from quad_nav.config.costmaps import COSTMAP_TABLE
+from quad_nav.config.fixes import FIXES, GROUPS
+from quad_nav.config.layers import LAYERS, SOURCE_TABLE
+from quad_nav.config.planners import (
+    CARROT,
+    DWA_PLANNER,
+    GLOBAL_PLANNERS,
+    LOCAL_PLANNERS,
+    SEARCH_PLANNER,
 )
-from quad_nav.config.tables.move_base import (
-    DEFAULT_GLOBAL_PLANNER,
-    DEFAULT_LOCAL_PLANNER,
-    MOVE_BASE_TABLE,
-)
-from quad_nav.config.tables.recoveries import CLEAR_COSTMAP_TABLE, MOVE_SLOW_TABLE, ROTATE_TABLE
-from quad_nav.config.tables.trajectory_planner import TRAJECTORY_PLANNER_TABLE
+from quad_nav.config.reader import Table
+from quad_nav.config.recoveries import CLEAR, MOVE_SLOW, ROTATE, TABLES
+from quad_nav.navigator.params import DEFAULT_GLOBAL_PLANNER, DEFAULT_LOCAL_PLANNER
+from quad_nav.parameter import Parameter
 
 _HEAD = """# Parameters
 
 Look up the name, default, range and meaning of every parameter of the navigator.
 
-`python -m quad_nav.config.reference` generates this page from the tables in
-`src/quad_nav/config/`.
+`python -m quad_nav.config.reference` generates this page from the declarations of the
+parameters, see `src/quad_nav/parameter.py`.
 
 Parameters have the names, places and meanings of ROS's `move_base` (navigation 1.17.3). A default
 is the value in force when nothing is set. Where the wiki differs from dynamic_reconfigure's
 description, the latter is used. Ranges are in parentheses. Values outside a range are clamped,
-with a warning. Parameters marked (R) can change in flight, with dynamic_reconfigure.
+with a warning. Parameters marked (R) can change in flight, with dynamic_reconfigure. Those marked
+(own) are not in upstream move_base.
 
 The navigator refuses wrong types and impossible values, such as a string for a number, NaN or a
 negative radius. It lists all errors before anything flies. It starts, with a warning for each, with
@@ -83,53 +80,61 @@ _SECTIONS: Tuple[Tuple[str, str, Table], ...] = (
     (
         "TrajectoryPlannerROS",
         f"The local planner `{DEFAULT_LOCAL_PLANNER}`.",
-        TRAJECTORY_PLANNER_TABLE,
+        LOCAL_PLANNERS[DEFAULT_LOCAL_PLANNER].table,
     ),
-    ("DWAPlannerROS", "The local planner `dwa_local_planner/DWAPlannerROS`.", DWA_TABLE),
-    ("NavfnROS", f"The global planner `{DEFAULT_GLOBAL_PLANNER}`.", NAVFN_TABLE),
+    (
+        "DWAPlannerROS",
+        "The local planner `dwa_local_planner/DWAPlannerROS`.",
+        LOCAL_PLANNERS[DWA_PLANNER].table,
+    ),
+    (
+        "NavfnROS",
+        f"The global planner `{DEFAULT_GLOBAL_PLANNER}`.",
+        GLOBAL_PLANNERS[DEFAULT_GLOBAL_PLANNER].table,
+    ),
     (
         "GlobalPlanner",
         "The global planner `global_planner/GlobalPlanner`.",
-        GLOBAL_PLANNER_TABLE,
+        GLOBAL_PLANNERS[SEARCH_PLANNER].table,
     ),
     (
         "CarrotPlanner",
         "The global planner `carrot_planner/CarrotPlanner`: a straight line to the goal.",
-        CARROT_TABLE,
+        GLOBAL_PLANNERS[CARROT].table,
     ),
     (
-        "fixes",
-        "Not in upstream move_base: fixes of its bugs, and additions. See"
-        " [upstream bugs](upstream_bugs.md).",
-        FIXES_TABLE,
+        FIXES,
+        "Our own: `upstream: true` restores [upstream bugs](upstream_bugs.md).",
+        GROUPS[FIXES],
     ),
+    ("peers", "Our own: see [avoidance between robots](peers.md).", GROUPS["peers"]),
     ("Costmaps", "In `global_costmap` and `local_costmap`.", COSTMAP_TABLE),
-    ("Obstacle layer", "`costmap_2d::ObstacleLayer`.", OBSTACLE_LAYER_TABLE),
-    ("Voxel layer", "`costmap_2d::VoxelLayer`.", VOXEL_LAYER_TABLE),
+    ("Obstacle layer", "`costmap_2d::ObstacleLayer`.", LAYERS["costmap_2d::ObstacleLayer"]),
+    ("Voxel layer", "`costmap_2d::VoxelLayer`.", LAYERS["costmap_2d::VoxelLayer"]),
     (
         "Sources",
         "Each name in `observation_sources` is a namespace in the layer's.",
         SOURCE_TABLE,
     ),
-    ("Inflation layer", "`costmap_2d::InflationLayer`.", INFLATION_LAYER_TABLE),
-    ("Static layer", "`costmap_2d::StaticLayer`.", STATIC_LAYER_TABLE),
+    ("Inflation layer", "`costmap_2d::InflationLayer`.", LAYERS["costmap_2d::InflationLayer"]),
+    ("Static layer", "`costmap_2d::StaticLayer`.", LAYERS["costmap_2d::StaticLayer"]),
     (
         "ClearCostmapRecovery",
         f"`clear_costmap_recovery/ClearCostmapRecovery`, {_BEHAVIOUR} `layer_names` lists the"
         " layers that are cleared; the obstacle layers if unset.",
-        CLEAR_COSTMAP_TABLE,
+        TABLES[CLEAR],
     ),
     (
         "RotateRecovery",
         f"`rotate_recovery/RotateRecovery`, {_BEHAVIOUR} Speeds and accelerations are those of"
         " TrajectoryPlannerROS.",
-        ROTATE_TABLE,
+        TABLES[ROTATE],
     ),
     (
         "MoveSlowAndClear",
         f"`move_slow_and_clear/MoveSlowAndClear`, {_BEHAVIOUR} It clears the obstacle layers around"
         " the robot and limits all speeds of the local planner until the robot has moved away.",
-        MOVE_SLOW_TABLE,
+        TABLES[MOVE_SLOW],
     ),
 )
 
@@ -145,20 +150,23 @@ def reference() -> str:
 def _rows(table: Table) -> List[str]:
     rows = ["| name and default | meaning |", "| --- | --- |"]
     for parameter in table.parameters:
-        mark = " (R)" if parameter in table.reconfigurable else ""
-        unit = "" if parameter.kind == "str" else parameter.unit
+        mark = "" if parameter.is_fixed else " (R)"
+        mark += " (own)" if parameter.is_own and not table.is_own else ""
+        unit = "" if parameter.kind == "str" or parameter.default is None else parameter.unit
         values = f"{_default(parameter)} {unit}".strip()
         if _range(parameter):
             values += f" ({_range(parameter)})"
         rows.append(f"| `{parameter.name}`{mark}<br>{values} | {parameter.description} |")
-    for name, reason in table.unsupported:
+    for name, reason in table.unsupported.items():
         rows.append(f"| `{name}` | not supported: {reason} |")
-    for name, reason in table.ignored:
+    for name, reason in table.ignored.items():
         rows.append(f"| `{name}` | ignored: {reason} |")
     return rows
 
 
 def _default(parameter: Parameter) -> str:
+    if parameter.default is None:
+        return "unset"
     if parameter.kind == "bool":
         return str(parameter.default).lower()
     if parameter.kind == "str":

@@ -1,6 +1,7 @@
 """Read a robot's configuration from whatever a person names, for both shells.
 
 default                        a shipped configuration
+my_robot/moving.yaml           an overlay on the folder my_robot/default beside it
 my_robot/config                a folder, see ``file_sets``
 my_robot/config:burger         one of the alternatives in a folder, or of its subfolders
 my_robot/config:prefix=a_      with values of $(arg prefix) in its files
@@ -16,7 +17,13 @@ from pathlib import Path
 from typing import List, Optional, Tuple
 
 from quad_nav.config.file_sets import FileSet, file_sets, is_standard, standard_set
-from quad_nav.config.files import COSTMAPS, ParameterTree, PlacedFile, load_files
+from quad_nav.config.files import (
+    COSTMAPS,
+    ParameterTree,
+    PlacedFile,
+    is_overlay,
+    load_files,
+)
 from quad_nav.config.launch_file import is_launch_file, load_launch_file
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import config_folder
@@ -43,7 +50,7 @@ def robot_set(name: str, number: str) -> FileSet:
         InputError: There is none, or the user has to choose one of several.
     """
     path, choice = split_source(name)
-    if not choice and path.is_dir() and is_standard(path, number):
+    if not choice and _is_standard(path, number):
         return standard_set(path, number)
     sets, _ = sets_of(name, number)
     if len(sets) == 1:
@@ -53,6 +60,10 @@ def robot_set(name: str, number: str) -> FileSet:
     raise InputError(
         [f"config: {name}: {len(sets)} configurations; expected one: {' or '.join(lines)}{more}"]
     )
+
+
+def _is_standard(path: Path, number: str) -> bool:
+    return is_overlay(path) or (path.is_dir() and is_standard(path, number))
 
 
 def sets_of(name: str, number: Optional[str] = None) -> Tuple[List[FileSet], List[Path]]:
@@ -69,6 +80,8 @@ def sets_of(name: str, number: Optional[str] = None) -> Tuple[List[FileSet], Lis
         InputError: There is no such file or folder, or no set in it.
     """
     path, choice = split_source(name)
+    if not choice and is_overlay(path):
+        return [standard_set(path, number or "0")], []
     if not path.is_dir():
         return [_set_of_files(path, choice, number or "0")], []
     sets, left = file_sets(path, number)

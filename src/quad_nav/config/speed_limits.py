@@ -12,13 +12,12 @@ from typing import Any, Dict, Mapping, Optional, Tuple
 from quad_nav.config.notes import CAUTION, Notes, join
 from quad_nav.config.planners import DWA_PLANNER
 from quad_nav.config.plugins import plugin_name
-from quad_nav.config.reader import fields
-from quad_nav.config.spec import Table
-from quad_nav.config.tables.dwa_planner import DWA_TABLE
-from quad_nav.config.tables.move_base import DEFAULT_LOCAL_PLANNER
-from quad_nav.config.tables.recoveries import MOVE_SLOW_TABLE
-from quad_nav.config.tables.trajectory_planner import TRAJECTORY_PLANNER_TABLE
+from quad_nav.config.reader import made
+from quad_nav.control.dwa_planner_params import DwaParams
+from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.files.values import nearest
+from quad_nav.navigator.params import DEFAULT_LOCAL_PLANNER
+from quad_nav.parameter import parameters_of
 from quad_nav.recovery import MoveSlowAndClearParams
 
 
@@ -26,7 +25,7 @@ from quad_nav.recovery import MoveSlowAndClearParams
 class Speeds:
     """Parameters of a local planner that limit its speeds."""
 
-    table: Table
+    owner: type
     translation: Tuple[str, ...]
     rotation: Tuple[str, ...]
 
@@ -35,7 +34,7 @@ class Speeds:
         """Return parameter -> field of every speed."""
         return {
             parameter.name: parameter.field
-            for parameter in self.table.parameters
+            for parameter in parameters_of(self.owner)
             if parameter.unit in ("m/s", "rad/s") and parameter.kind == "double"
         }
 
@@ -43,12 +42,12 @@ class Speeds:
 # Plugins are not in it: they have no reconfigurable parameters.
 SPEEDS: Dict[str, Speeds] = {
     DEFAULT_LOCAL_PLANNER: Speeds(
-        TRAJECTORY_PLANNER_TABLE,
+        TrajectoryPlannerParams,
         translation=("max_vel_x", "min_vel_x", "escape_vel"),
         rotation=("max_vel_theta", "min_vel_theta", "min_in_place_vel_theta", "max_rotational_vel"),
     ),
     DWA_PLANNER: Speeds(
-        DWA_TABLE,
+        DwaParams,
         translation=(
             "max_vel_trans",
             "min_vel_trans",
@@ -106,10 +105,11 @@ def slow_params(namespace: Mapping[str, Any], planner: str) -> MoveSlowAndClearP
             return ""  # upstream calls the dynamic_reconfigure server of another planner
         return speeds.fields.get(namespace.get(key, "") or _NAMES[key], "")
 
-    return MoveSlowAndClearParams(
+    return made(
+        MoveSlowAndClearParams,
+        namespace,
         named_translation_field=named("max_trans_param_name"),
         named_rotation_field=named("max_rot_param_name"),
         translation_fields=limited(speeds.translation if speeds else (), "max_trans_param_name"),
         rotation_fields=limited(speeds.rotation if speeds else (), "max_rot_param_name"),
-        **fields(namespace, MOVE_SLOW_TABLE.parameters),
     )

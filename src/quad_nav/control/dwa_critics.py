@@ -35,23 +35,21 @@ from typing import NamedTuple, Optional, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control import dwa_kernel as kernel
+from quad_nav.control import dwa_search
 from quad_nav.control.dwa_oscillation import OscillationCritic
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.dwa_samples import acceleration_limits, velocity_samples
-from quad_nav.control.prediction import NO_DISCS
+from quad_nav.control.map_grid_kernel import distances_ahead
 from quad_nav.control.rollout import (
     Trajectory,
     Triple,
     costmap_view,
     single,
 )
+from quad_nav.costmap.collision import highest_near
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
-from quad_nav.kernels import dwa as kernel
-from quad_nav.kernels import dwa_search
-from quad_nav.kernels.collision import highest_near
-from quad_nav.kernels.map_grid import distances_ahead
-from quad_nav.kernels.moving_discs import MovingDiscs
 
 NO_LEGAL_TRAJECTORY = -7.0
 
@@ -87,7 +85,6 @@ class Critics:
         pose: Pose2D,
         velocity: Twist2D,
         grids: Optional[DwaGrids] = None,
-        moving: MovingDiscs = NO_DISCS,
     ) -> None:
         self.params = params
         self.spec = spec
@@ -97,7 +94,6 @@ class Critics:
         self.goal = Pose2D(*plan[-1].tolist())
         self.costmap = costmap_view(spec, costs)
         self.footprint = footprint
-        self.moving = moving
         self.grids = self._measure(plan) if grids is None else grids
         self.path_scale = float(params.path_distance_bias * spec.resolution_m)  # per cell
         self.goal_scale = float(params.goal_distance_bias * spec.resolution_m)
@@ -210,7 +206,6 @@ class Critics:
             self.footprint,
             scale=float(self.params.occdist_scale),
             sums=bool(self.params.sum_scores),
-            moving=self.moving,
         )
 
 

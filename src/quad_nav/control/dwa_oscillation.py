@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Tuple
 
+from quad_nav.control.dwa_search import Directions
 from quad_nav.control.rollout import Triple
 from quad_nav.geometry import Pose2D
-from quad_nav.kernels.dwa_search import Directions
 
 
 @dataclass

@@ -141,7 +141,6 @@ class DwaPlanner(PlanFollower):
             pose,
             velocity,
             grids,
-            self.moving,
         )
         if not self.critics.is_legal((command.vx_mps, command.vy_mps, command.vyaw_radps)):
             raise NoValidTrajectory(
@@ -160,7 +159,6 @@ class DwaPlanner(PlanFollower):
             self.local_global_plan,
             pose,
             velocity,
-            moving=self.moving,
         )
         self._grids = self.critics.grids
         self.best = self.critics.choose(self.oscillation, self.control_period_s)

@@ -14,10 +14,10 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control.dwa_kernel import sample_grid
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.rollout import Triple, single
 from quad_nav.geometry import Pose2D
-from quad_nav.kernels.dwa import sample_grid
 
 
 def velocity_samples(

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control.map_grid_kernel import distances
+from quad_nav.costmap.cost_grid_kernel import CostmapView
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import GridSpec
-from quad_nav.kernels.cost_grid import CostmapView
-from quad_nav.kernels.map_grid import distances
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.control.prediction import NO_DISCS
+from quad_nav.control.plan_follower_kernel import count_farther, stretch_near
 from quad_nav.errors import NoLocalPlan
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import GridSpec
-from quad_nav.kernels.plan_follower import count_farther, stretch_near
 
 NO_POSES = np.zeros((0, 3))
 _PASSED_BEYOND_M = 1.0
@@ -28,7 +27,6 @@ class PlanFollower:
         local_global_plan: float64[m, 3], its part in the local costmap, in the local frame; also
             after a failed call.
         footprint: float64[n, 2], padded, in the robot's frame.
-        moving: Moving obstacles that rollouts are judged against, in the local costmap's frame.
         rotating_to_goal: The robot turns to the goal's heading.
         xy_tolerance_latch: The robot has been at the goal's position.
     """
@@ -40,7 +38,6 @@ class PlanFollower:
         self.control_period_s = control_period_s
         self.plan = NO_POSES
         self.local_global_plan = NO_POSES
-        self.moving = NO_DISCS
         self.rotating_to_goal = False
         self.xy_tolerance_latch = False
         self._goal_reached = False

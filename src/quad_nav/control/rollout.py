@@ -32,17 +32,15 @@ from typing import Optional, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control import rollout_kernel as kernel
 from quad_nav.control.map_grid import cost_cloud, distance_grids
-from quad_nav.control.prediction import NO_DISCS
+from quad_nav.control.sample_motion import RolloutParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.control.velocity_search_kernel import SampleRules, VelocityWindow, search
+from quad_nav.costmap import collision
+from quad_nav.costmap.cost_grid_kernel import CostmapView
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, LETHAL, GridSpec
-from quad_nav.kernels import collision
-from quad_nav.kernels import rollout as kernel
-from quad_nav.kernels.cost_grid import CostmapView
-from quad_nav.kernels.motion import RolloutParams
-from quad_nav.kernels.moving_discs import MovingDiscs
-from quad_nav.kernels.velocity_search import SampleRules, VelocityWindow, search
 
 Triple = Tuple[float, float, float]
 
@@ -85,7 +83,6 @@ class Rollout:
         plan: NDArray[np.float64],
         pose: Pose2D,
         velocity: Twist2D,
-        moving: MovingDiscs = NO_DISCS,
     ) -> None:
         self.spec = spec
         self.pose = Pose2D(*single(pose.x_m, pose.y_m, pose.yaw_rad))
@@ -108,7 +105,6 @@ class Rollout:
             self.grids.path,
             self.grids.goal,
             plan,
-            moving,
         )
         self.kernel_params = _kernel_params(params, spec.resolution_m)
 

@@ -18,12 +18,12 @@ from quad_nav.control.goal import is_stopped, stopping_command, turning_command
 from quad_nav.control.oscillation import Oscillation
 from quad_nav.control.plan_follower import NO_POSES, PlanFollower
 from quad_nav.control.rollout import Rollout, Trajectory
+from quad_nav.control.rollout_kernel import OUT_OF_REACH
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.control.velocity_search import choose_trajectory
 from quad_nav.errors import NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
 from quad_nav.grid import GridSpec
-from quad_nav.kernels.rollout import OUT_OF_REACH
 
 __all__ = ["TrajectoryPlanner", "TrajectoryPlannerParams"]
 
@@ -123,7 +123,6 @@ class TrajectoryPlanner(PlanFollower):
             self.local_global_plan,
             pose,
             velocity,
-            self.moving,
         )
         self.best = choose_trajectory(
             self.rollout, self.params, self.oscillation, self.control_period_s

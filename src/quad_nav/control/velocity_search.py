@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 
 from quad_nav.control.oscillation import Oscillation
 from quad_nav.control.rollout import Rollout, Trajectory, Triple
+from quad_nav.control.rollout_kernel import OUT_OF_REACH
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.control.velocity_search_kernel import NO_SAMPLE, SampleRules, VelocityWindow
+from quad_nav.costmap.collision import COLLIDES
 from quad_nav.geometry import Pose2D
-from quad_nav.kernels.collision import COLLIDES
-from quad_nav.kernels.rollout import OUT_OF_REACH
-from quad_nav.kernels.velocity_search import NO_SAMPLE, SampleRules, VelocityWindow
 
 _ESCAPE_COST = 1.0
 

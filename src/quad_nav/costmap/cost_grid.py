@@ -8,8 +8,8 @@ from typing import Optional, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.costmap.cost_grid_kernel import CostmapView, fill_polygon, raise_to, reset_to
 from quad_nav.grid import FREE, INSCRIBED, LETHAL, UNKNOWN, GridSpec
-from quad_nav.kernels.cost_grid import CostmapView, fill_polygon, raise_to, reset_to
 
 
 @dataclass(frozen=True)

@@ -23,23 +23,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.costmap.cost_grid import EVERYWHERE, Bounds, CostGrid, Window
+from quad_nav.costmap.inflation_kernel import STEP_BITS, Ranks, inflate
 from quad_nav.costmap.layer import Layer, LayerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import INSCRIBED, LETHAL, GridSpec
-from quad_nav.kernels.inflation import STEP_BITS, Ranks, inflate
+from quad_nav.parameter import flag, number
 
 
 @dataclass(frozen=True)
 class InflationLayerParams(LayerParams):
-    """Parameters of ``costmap_2d::InflationLayer``.
+    """Parameters of ``costmap_2d::InflationLayer``."""
 
-    Attributes:
-        cost_scaling_factor: Decay in 1/m beyond the inscribed radius.
-    """
-
-    inflation_radius_m: float = 0.55
-    cost_scaling_factor: float = 10.0
-    inflate_unknown: bool = False
+    cost_scaling_factor: float = number(
+        "cost_scaling_factor", 10.0, "1/m", 0, 100, "Decay of costs beyond the inscribed radius."
+    )
+    inflation_radius_m: float = number(
+        "inflation_radius", 0.55, "metres", 0, 50, "Distance to which obstacles are inflated."
+    )
+    inflate_unknown: bool = flag("inflate_unknown", False, "Inflate unknown cells, too.")
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> InflationLayer:
         """Make an inflation layer."""

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from quad_nav.costmap.cost_grid import NOWHERE, Bounds, CostGrid, Window
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, GridSpec
+from quad_nav.parameter import flag
 
 
 class Redraw(enum.Enum):
@@ -33,13 +34,9 @@ class Redraw(enum.Enum):
 
 @dataclass(frozen=True)
 class LayerParams:
-    """Parameters that every layer has.
+    """Parameters that every layer has."""
 
-    Attributes:
-        enabled: False to skip the layer.
-    """
-
-    enabled: bool = True
+    enabled: bool = flag("enabled", True, "False skips the layer.")
 
     @property
     def bytes_per_cell(self) -> int:

@@ -18,6 +18,7 @@ from quad_nav import footprint as footprints
 from quad_nav.costmap.cost_grid import NO_CELLS, NOWHERE, CostGrid, Window
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layer import Layer, LayerParams, Redraw
+from quad_nav.costmap.map_params import MapParams
 from quad_nav.costmap.obstacle import ObstacleLayer, ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayer, StaticMap
 from quad_nav.costmap.voxel import VoxelLayer
@@ -37,30 +38,13 @@ NamedLayers = Tuple[Tuple[str, LayerParams], ...]
 
 
 @dataclass(frozen=True)
-class CostmapParams:
+class CostmapParams(MapParams):
     """Parameters of ``global_costmap`` or ``local_costmap``, as in costmap_2d.
 
     Attributes:
-        footprint: Unpadded, in the robot's frame; None for a circle of ``robot_radius_m``.
         layers: (name, parameters) of the layers in the order of updates.
     """
 
-    global_frame: str = "map"
-    robot_base_frame: str = "base_link"
-    update_frequency_hz: float = 5.0
-    publish_frequency_hz: float = 0.0
-    width_m: float = 10.0
-    height_m: float = 10.0
-    resolution_m: float = 0.05
-    origin_x_m: float = 0.0
-    origin_y_m: float = 0.0
-    rolling_window: bool = False
-    track_unknown_space: bool = False
-    always_send_full_costmap: bool = False
-    footprint: Optional[Tuple[Tuple[float, float], ...]] = None
-    robot_radius_m: float = 0.46
-    footprint_padding_m: float = 0.01
-    transform_tolerance_s: float = 0.3
     layers: NamedLayers = (
         ("obstacle_layer", ObstacleLayerParams()),
         ("inflation_layer", InflationLayerParams()),

@@ -9,12 +9,13 @@ from typing import Callable, List, Optional, Tuple, Union
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.observations import (
+from quad_nav.costmap.observation_kernel import (
     ObservationStack,
     Ranges,
     store_marks,
     store_observation,
 )
+from quad_nav.parameter import ANY, fixed_flag, fixed_number, fixed_text
 
 
 @dataclass(frozen=True)
@@ -22,26 +23,41 @@ class SourceParams:
     """Entry of an obstacle layer's ``observation_sources``.
 
     Attributes:
-        sensor_frame: Frame where rays start; "" for the frame of the message.
-        expected_update_period_s: ``expected_update_rate`` of the YAML, which is a period; 0 for
-            never stale.
-        obstacle_range_m: None for the layer's.
-        raytrace_range_m: None for the layer's.
+        expected_update_period_s: ``expected_update_rate`` of the YAML, which is a period.
+        obstacle_range_m: None for the layer's; ``raytrace_range_m`` too.
     """
 
     name: str
-    topic: str = ""
-    sensor_frame: str = ""
-    data_type: str = "PointCloud"
-    observation_persistence_s: float = 0.0
-    expected_update_period_s: float = 0.0
-    min_obstacle_height_m: float = 0.0
-    max_obstacle_height_m: float = 2.0
-    obstacle_range_m: Optional[float] = None
-    raytrace_range_m: Optional[float] = None
-    marking: bool = True
-    clearing: bool = False
-    inf_is_valid: bool = False
+    topic: str = fixed_text("topic", "", "a topic's name", "The source's name if unset.")
+    sensor_frame: str = fixed_text(
+        "sensor_frame", "", "a frame's name", "Frame of the rays' start; the message's if unset."
+    )
+    data_type: str = fixed_text(
+        "data_type", "PointCloud", "LaserScan, PointCloud or PointCloud2", "Type of the topic."
+    )
+    observation_persistence_s: float = fixed_number(
+        "observation_persistence", 0.0, "seconds", "Observations stay so long; 0 for the newest."
+    )
+    expected_update_period_s: float = fixed_number(
+        "expected_update_rate", 0.0, "seconds", "Period after which data is overdue; 0 for never."
+    )
+    min_obstacle_height_m: float = fixed_number(
+        "min_obstacle_height", 0.0, "metres", "Points below this height are ignored.", ANY
+    )
+    max_obstacle_height_m: float = fixed_number(
+        "max_obstacle_height", 2.0, "metres", "Points above this height are ignored.", ANY
+    )
+    obstacle_range_m: Optional[float] = fixed_number(
+        "obstacle_range", None, "metres", "Range of marking; the layer's if unset."
+    )
+    raytrace_range_m: Optional[float] = fixed_number(
+        "raytrace_range", None, "metres", "Range of clearing; the layer's if unset."
+    )
+    marking: bool = fixed_flag("marking", True, "The sensor marks obstacles.")
+    clearing: bool = fixed_flag("clearing", False, "The sensor clears the space before obstacles.")
+    inf_is_valid: bool = fixed_flag(
+        "inf_is_valid", False, "Beams of a LaserScan that return inf clear up to range_max."
+    )
 
 
 Points = Union[NDArray[np.float32], Callable[[], NDArray[np.float32]]]

@@ -14,18 +14,44 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.costmap.cost_grid import Bounds, CostGrid, Window, merge_known, merge_maximum
+from quad_nav.costmap.cost_grid_kernel import place_polygon
 from quad_nav.costmap.layer import GridLayer, LayerParams, Redraw
 from quad_nav.costmap.observation import Observation, ObservationBuffer, SourceParams
+from quad_nav.costmap.observation_kernel import Ranges
 from quad_nav.costmap.projection import scan_points, transform_points
+from quad_nav.costmap.projection_kernel import outside_circles
+from quad_nav.costmap.raytrace import clear_all_rays, mark_all_points
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
-from quad_nav.kernels.cost_grid import place_polygon
-from quad_nav.kernels.observations import Ranges
-from quad_nav.kernels.projection import outside_circles
-from quad_nav.kernels.raytrace import clear_all_rays, mark_all_points
+from quad_nav.parameter import (
+    Choice,
+    choice,
+    deviation,
+    fixed_flag,
+    fixed_number,
+    fixed_text,
+    flag,
+    signed,
+)
 
 COMBINE_OVERWRITE = 0
 COMBINE_MAXIMUM = 1
+_COMBINATIONS = (
+    Choice("Overwrite", COMBINE_OVERWRITE, "Overwrite values"),
+    Choice("Maximum", COMBINE_MAXIMUM, "Take the maximum of the values"),
+    Choice("Nothing", 99, "Do nothing"),
+)
+
+
+def combination_choice() -> Any:
+    """Declare ``combination_method``, the last reconfigurable parameter of a layer's class."""
+    return choice(
+        "combination_method",
+        COMBINE_MAXIMUM,
+        _COMBINATIONS,
+        "Method for combining two layers",
+        choices_description="Method for combining layers enum",
+    )
 
 
 @dataclass(frozen=True)
@@ -35,22 +61,34 @@ class ObstacleLayerParams(LayerParams):
     Attributes:
         combination_method: 0 overwrites known cells of the master grid, 1 takes the maximum, any
             other value leaves the master grid alone.
-        obstacle_range_m: Counts for sources that set none of their own.
-        raytrace_range_m: Counts for sources that set none of their own.
         track_unknown_space: None for the costmap's.
-        sources: Observation sources.
+        observation_sources: Names of the ``sources``.
         notice_silence_at_once: The layer is not current as soon as a source is overdue; False
             restores upstream behaviour, where an update of the costmap finds out.
     """
 
-    footprint_clearing_enabled: bool = True
-    max_obstacle_height_m: float = 2.0
-    combination_method: int = COMBINE_MAXIMUM
-    obstacle_range_m: float = 2.5
-    raytrace_range_m: float = 3.0
-    track_unknown_space: Optional[bool] = None
+    footprint_clearing_enabled: bool = flag(
+        "footprint_clearing_enabled", True, "Clear the robot's footprint of obstacles."
+    )
+    max_obstacle_height_m: float = signed(
+        "max_obstacle_height", 2.0, "metres", 0, 50, "Points above this height are ignored."
+    )
+    combination_method: int = combination_choice()
+
+    obstacle_range_m: float = fixed_number(
+        "obstacle_range", 2.5, "metres", "Range of marking, for sources that set none."
+    )
+    raytrace_range_m: float = fixed_number(
+        "raytrace_range", 3.0, "metres", "Range of clearing, for sources that set none."
+    )
+    track_unknown_space: Optional[bool] = fixed_flag(
+        "track_unknown_space", None, "Cells are unknown until seen; the costmap's if unset."
+    )
+    observation_sources: str = fixed_text(
+        "observation_sources", "", "names separated by blanks", "Each has a namespace of its name."
+    )
     sources: Tuple[SourceParams, ...] = ()
-    notice_silence_at_once: bool = True
+    notice_silence_at_once: bool = deviation()
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> ObstacleLayer:
         """Make an obstacle layer."""

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.costmap.cost_grid import NOWHERE, Bounds, CostGrid, Window
+from quad_nav.costmap.cost_grid_kernel import raise_discs
 from quad_nav.costmap.layer import Layer, LayerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import GridSpec
-from quad_nav.kernels.peers import raise_discs
 
 
 @dataclass(frozen=True)

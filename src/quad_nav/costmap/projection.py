@@ -14,8 +14,8 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.costmap.projection_kernel import project_scan, transform_between_heights
 from quad_nav.geometry import Pose3D, Scan
-from quad_nav.kernels.projection import project_scan, transform_between_heights
 
 _IDENTITY, _NO_CIRCLES = Pose3D(0.0, 0.0, 0.0), np.empty((0, 3))
 

@@ -2,13 +2,14 @@
 
 Both shells use it: ``ros/navigator/sensors.py`` has one ``ScanIntake`` for each topic,
 ``loop/navigator_group.py`` one for the LIDAR. The shell knows where the sensor was; the intake
-decides whether a scan counts and lets layers that see a message alike share its projection.
+passes scans through the robot's filters and lets layers that see a message alike share its
+projection.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +17,9 @@ from numpy.typing import NDArray
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.observation import Observation, SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayer
-from quad_nav.costmap.scan_validator import ScanValidator, ScanValidatorParams
+from quad_nav.costmap.scan_filter import ScanFilters, ScanSituation
+from quad_nav.costmap.scan_validator import ScanValidator, late_reason
 from quad_nav.geometry import Pose3D, Scan
-from quad_nav.tracking.tracker import ObstacleTracker, TrackedScan
 
 
 @dataclass(frozen=True)
@@ -60,101 +61,101 @@ def sinks_of(costmaps: Sequence[LayeredCostmap]) -> List[Sink]:
 
 
 class ScanIntake:
-    """Validate the messages of one sensor and hand them to its sinks.
+    """Filter the messages of one sensor and hand them to its sinks.
 
     Attributes:
         sinks: Layers and sources that take the messages.
+        expected_period_s: Longest silence with which every layer stays current, in seconds; 0 for
+            any.
     """
 
-    def __init__(
-        self,
-        sinks: Sequence[Sink],
-        params: ScanValidatorParams,
-        tracker: Optional[ObstacleTracker] = None,
-    ) -> None:
-        """Hand messages to sinks, and the scans to a tracker before.
+    def __init__(self, sinks: Sequence[Sink], filters: ScanFilters, local_frame: str) -> None:
+        """Hand messages to sinks.
 
         Args:
             sinks: Layers and sources that take the messages.
-            params: Parameters of the scan validation.
-            tracker: Tracker of moving obstacles, which are not marked then.
+            filters: The robot's filters of scans.
+            local_frame: Global frame of the local costmap.
         """
         self.sinks = tuple(sinks)
-        self._tracker = tracker
+        self._filters, self._local_frame = filters, local_frame
         frames = [sink.costmap.params.global_frame for sink in self.sinks]
-        is_tracked = tracker is not None and tracker.frame in frames
-        self._tracking_sink = frames.index(tracker.frame) if tracker and is_tracked else None
+        is_local = self._local_frame in frames
+        self._filtered_sink = frames.index(self._local_frame) if is_local else 0
         self._keys = [sink.layer.projection_key(sink.source.name) for sink in self.sinks]
         self._buffers = [sink.layer.buffers[sink.source.name] for sink in self.sinks]
-        self._params = params
-        self._validator = ScanValidator(sink.source for sink in self.sinks)
+        self._expect(sink.source for sink in self.sinks)
 
-    @property
-    def expected_period_s(self) -> float:
-        """Longest silence with which every layer stays current, in seconds; 0 for any."""
-        return self._validator.expected_period_s
+    def _expect(self, sources: Iterable[SourceParams]) -> None:
+        periods_s = [source.expected_update_period_s for source in sources]
+        self.expected_period_s = min((one for one in periods_s if one > 0.0), default=0.0)
 
-    def reconfigure(self, params: ScanValidatorParams) -> None:
-        """Take other parameters, and those of the buffers; what the validator has seen stays."""
-        self._params = params
-        self._validator.expect(buffer.params for buffer in self._buffers)
+    def reconfigure(self) -> None:
+        """Take the present parameters of the buffers."""
+        self._expect(buffer.params for buffer in self._buffers)
 
     def reset(self) -> None:
         """Forget earlier scans, after the clock has jumped."""
-        self._validator.reset()
-        if self._tracker is not None:
-            self._tracker.reset()
+        self._filters.reset()
 
     def is_late(self, stamp_s: float, now_s: float) -> bool:
         """Tell whether a scan with this stamp is rejected now for its age."""
-        rejects = self._params.reject_implausible_scans
-        return rejects and bool(self._validator.late_reason(stamp_s, now_s))
+        return self._validates and bool(late_reason(stamp_s, now_s, self.expected_period_s))
+
+    @property
+    def _validates(self) -> bool:
+        """Whether implausible scans are rejected."""
+        return any(
+            isinstance(one, ScanValidator) and one.params.reject_implausible_scans
+            for one in self._filters.filters
+        )
 
     def add_scan(
         self, scan: Scan, poses: Sequence[SensorPose], received_s: float, now_s: float
     ) -> str:
-        """Hand a scan to the layers unless it is implausible.
+        """Hand a scan to the layers unless a filter rejects it.
 
         Args:
             scan: The scan, in the frame of ``poses[k].frame``.
             poses: Poses at the scan's stamp, one for each sink.
             received_s: When the scan arrived. With ``reject_implausible_scans`` the stamp
                 counts if it is earlier, so that late scans are not taken for recent ones.
-            now_s: Current time, against which the validator judges the scan's age.
+            now_s: Current time.
 
         Returns:
             The reason for which the scan was rejected, "" if the layers have it.
         """
-        if self.sinks and self._params.reject_implausible_scans:
-            reason = self._validator.rejection_reason(scan, poses[0].frame, now_s)
-            if reason:
-                return reason
-
-        tracked = self._track(scan, poses)
-        moving = tracked.moving_beams if tracked is not None and tracked.any_moving else None
+        if not self.sinks:
+            return ""
+        pose = poses[self._filtered_sink].frame
+        filtered = self._filters.filter(scan, self._situation(pose, now_s))
+        if filtered.rejected:
+            return filtered.rejected
+        if len(filtered.vacated):
+            at_sensor = pose.inverse().transform_points(filtered.vacated)
+            for sink, there in zip(self.sinks, poses):
+                sink.layer.forget_points(there.frame.transform_points(at_sensor))
 
         def make(sink: Sink, pose: SensorPose) -> Observation:
             name, layer = sink.source.name, sink.layer
-            return layer.observe_scan(name, scan, pose.frame, pose.origin, moving)
+            return layer.observe_scan(name, filtered.scan, pose.frame, pose.origin, filtered.masked)
 
         self._add(make, poses, scan.stamp_s, received_s)
         return ""
 
-    def _track(self, scan: Scan, poses: Sequence[SensorPose]) -> Optional[TrackedScan]:
-        """Show the tracker a scan, and free the cells that obstacles have left."""
-        k, tracker = self._tracking_sink, self._tracker
-        if k is None or tracker is None:
-            return None
-        sink, pose = self.sinks[k], poses[k].frame
-        _, low_m, high_m = self._keys[k]
-        circles = sink.layer.excluded_circles
-        name = sink.source.topic or sink.source.name
-        tracked = tracker.add_scan(name, scan, pose, (low_m, high_m), circles)
-        if tracked is not None and len(tracked.vacated):
-            at_sensor = pose.inverse().transform_points(tracked.vacated)
-            for other, there in zip(self.sinks, poses):
-                other.layer.forget_points(there.frame.transform_points(at_sensor))
-        return tracked
+    def _situation(self, pose: Pose3D, now_s: float) -> ScanSituation:
+        sink = self.sinks[self._filtered_sink]
+        source = sink.source
+        _, low_m, high_m = self._keys[self._filtered_sink]
+        return ScanSituation(
+            now_s,
+            f"{source.topic or source.name} {source.sensor_frame}".strip(),
+            pose,
+            sink.costmap.params.global_frame == self._local_frame,
+            self.expected_period_s,
+            (low_m, high_m),
+            sink.layer.excluded_circles,
+        )
 
     def add_cloud(
         self,
@@ -181,7 +182,7 @@ class ScanIntake:
     def _add(
         self, make: _MakeObservation, poses: Sequence[SensorPose], stamp_s: float, received_s: float
     ) -> None:
-        if self._params.reject_implausible_scans:
+        if self._validates:
             received_s = min(received_s, stamp_s)
         made: List[_Made] = []
         for sink, key, buffer, pose in zip(self.sinks, self._keys, self._buffers, poses):

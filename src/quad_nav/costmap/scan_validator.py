@@ -14,15 +14,16 @@ navigator stops the robot. The validator rejects
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Iterable, Optional, Tuple
+from dataclasses import dataclass, replace
+from typing import Dict, Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.costmap.observation import SourceParams
+from quad_nav.costmap.projection_kernel import count_returns
+from quad_nav.costmap.scan_filter import FilteredScan, ScanFilter, ScanSituation
 from quad_nav.geometry import Pose3D, Scan, angle_difference
-from quad_nav.kernels.projection import count_returns
+from quad_nav.parameter import flag
 
 _ELSEWHERE_M, _ELSEWHERE_RAD = 0.05, 0.05
 # A larger step of the pose from one scan to the next is a correction of the localisation.
@@ -34,47 +35,59 @@ _ALL_AROUND_RAD = 2.0 * math.pi * 0.98
 
 @dataclass(frozen=True)
 class ScanValidatorParams:
-    """Parameters of the scan validation.
+    """Parameters of the scan validation."""
+
+    reject_implausible_scans: bool = flag(
+        "reject_implausible_scans", True, "Reject scans that cannot be true.", upstream=False
+    )
+
+
+class ScanValidator(ScanFilter):
+    """Scan filter that rejects implausible scans.
 
     Attributes:
-        reject_implausible_scans: Reject them; upstream move_base takes every scan.
+        params: The parameters; they may change in flight.
     """
 
-    reject_implausible_scans: bool = True
+    def __init__(self, params: ScanValidatorParams) -> None:
+        self.params = params
+        self._sensors: Dict[str, SensorValidator] = {}
 
-
-class ScanValidator:
-    """Judge the scans of one sensor, one after the other.
-
-    Attributes:
-        expected_period_s: Shortest ``expected_update_period_s`` of the sources that set one,
-            else 0. A scan of this age is late; with 0 none is.
-    """
-
-    def __init__(self, sources: Iterable[SourceParams]) -> None:
-        self.expect(sources)
-        self.reset()
-
-    def expect(self, sources: Iterable[SourceParams]) -> None:
-        """Take the shortest period within which the sources are expected."""
-        periods_s = [source.expected_update_period_s for source in sources]
-        self.expected_period_s = min((one for one in periods_s if one > 0.0), default=0.0)
+    def filter(self, filtered: FilteredScan, situation: ScanSituation) -> FilteredScan:
+        """Return the scan, rejected if no working LIDAR can have taken it."""
+        if not self.params.reject_implausible_scans:
+            return filtered
+        sensor = self._sensors.setdefault(situation.sensor, SensorValidator())
+        reason = sensor.rejection_reason(
+            filtered.scan, situation.pose, situation.now_s, situation.expected_period_s
+        )
+        return replace(filtered, rejected=reason)
 
     def reset(self) -> None:
         """Forget earlier scans, after the clock has jumped."""
+        self._sensors.clear()
+
+
+class SensorValidator:
+    """Judge the scans of one sensor, one after the other."""
+
+    def __init__(self) -> None:
         self._first_equal: Optional[Tuple[bytes, Pose3D]] = None  # content, pose of the first
         self._previous_pose: Optional[Pose3D] = None
         self._accepted: Optional[Tuple[Pose3D, int, int]] = None  # pose, beams, near returns
 
-    def rejection_reason(self, scan: Scan, global_from_sensor: Pose3D, now_s: float) -> str:
+    def rejection_reason(
+        self, scan: Scan, frame_from_sensor: Pose3D, now_s: float, expected_period_s: float
+    ) -> str:
         """Return the reason to reject a scan that arrives now, "" to accept it.
 
         Args:
             scan: The scan.
-            global_from_sensor: Pose of the LIDAR at the scan's stamp.
+            frame_from_sensor: Pose of the LIDAR at the scan's stamp, in a fixed frame.
             now_s: Current time.
+            expected_period_s: A scan of this age is late; with 0 none is.
         """
-        here = global_from_sensor
+        here = frame_from_sensor
         ranges = np.ascontiguousarray(scan.ranges_m, dtype=np.float32)
         returns, near = count_returns(
             ranges,
@@ -83,7 +96,7 @@ class ScanValidator:
             np.float32(0.5 * scan.range_max_m),
         )
         reason = (
-            self.late_reason(scan.stamp_s, now_s)
+            late_reason(scan.stamp_s, now_s, expected_period_s)
             or _empty(ranges, returns)
             or self._repeated(ranges, here, returns)
             or self._lost_returns(scan, here, returns)
@@ -91,13 +104,6 @@ class ScanValidator:
         if not reason:
             self._accepted = here, len(ranges), near
         return reason
-
-    def late_reason(self, stamp_s: float, now_s: float) -> str:
-        """Return why a scan with this stamp is too old now, "" if it is not."""
-        age_s, limit_s = now_s - stamp_s, self.expected_period_s
-        if not 0.0 < limit_s <= age_s:
-            return ""
-        return f"it is {age_s:.2f} s old, expected less than {limit_s:.2f} s"
 
     def _repeated(self, ranges: NDArray[np.float32], here: Pose3D, returns: int) -> str:
         content, previous, self._previous_pose = ranges.tobytes(), self._previous_pose, here
@@ -135,6 +141,14 @@ class ScanValidator:
         if near - returns <= (_LOST_SHARE + may_leave) * beams:
             return ""
         return f"{near - returns} of {beams} beams lost their return at once"
+
+
+def late_reason(stamp_s: float, now_s: float, expected_period_s: float) -> str:
+    """Return why a scan with this stamp is too old now, "" if it is not."""
+    age_s = now_s - stamp_s
+    if not 0.0 < expected_period_s <= age_s:
+        return ""
+    return f"it is {age_s:.2f} s old, expected less than {expected_period_s:.2f} s"
 
 
 def _empty(ranges: NDArray[np.float32], returns: int) -> str:

@@ -19,6 +19,7 @@ from quad_nav.costmap.cost_grid import (
 from quad_nav.costmap.layer import GridLayer, LayerParams
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
+from quad_nav.parameter import deviation, fixed_flag, fixed_text, fixed_whole
 
 UPDATE_BYTES_PER_CELL = 30
 """Memory of a map update's indices and costs, for each of its cells."""
@@ -44,8 +45,6 @@ class StaticLayerParams(LayerParams):
     """Parameters of ``costmap_2d::StaticLayer``.
 
     Attributes:
-        lethal_cost_threshold: Occupancy, 0..100, from which on cells are lethal.
-        unknown_cost_value: Occupancy, -1..100, of unknown cells.
         draw_all_map_updates: Draw every map update, cut at the map's borders, and in a rolling
             window the whole map; False restores upstream behaviour: the last one alone, and
             in a rolling window its area alone until the next map.
@@ -56,17 +55,29 @@ class StaticLayerParams(LayerParams):
             upstream behaviour: only where its own coordinates are in that frame.
     """
 
-    map_topic: str = "map"
-    first_map_only: bool = False
-    subscribe_to_updates: bool = False
-    track_unknown_space: bool = True
-    use_maximum: bool = False
-    lethal_cost_threshold: int = 100
-    unknown_cost_value: int = -1
-    trinary_costmap: bool = True
-    draw_all_map_updates: bool = True
-    restore_static_map: bool = True
-    transform_map_bounds: bool = True
+    map_topic: str = fixed_text("map_topic", "map", "a topic's name", "Topic of the map.")
+    first_map_only: bool = fixed_flag("first_map_only", False, "Ignore all maps but the first.")
+    subscribe_to_updates: bool = fixed_flag(
+        "subscribe_to_updates", False, "Subscribe to the updates of the map too."
+    )
+    track_unknown_space: bool = fixed_flag(
+        "track_unknown_space", True, "Unknown cells of the map stay unknown."
+    )
+    use_maximum: bool = fixed_flag(
+        "use_maximum", False, "Use the maximum of the map's and the other layers' costs."
+    )
+    lethal_cost_threshold: int = fixed_whole(
+        "lethal_cost_threshold", 100, "Smallest occupancy of an obstacle.", low=0, high=100
+    )
+    unknown_cost_value: int = fixed_whole(
+        "unknown_cost_value", -1, "Occupancy that means unknown; counts modulo 256."
+    )
+    trinary_costmap: bool = fixed_flag(
+        "trinary_costmap", True, "Cells are free, unknown or obstacles, without values between."
+    )
+    draw_all_map_updates: bool = deviation()
+    restore_static_map: bool = deviation()
+    transform_map_bounds: bool = deviation()
 
     @property
     def bytes_per_cell(self) -> int:

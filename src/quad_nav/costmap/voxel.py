@@ -22,10 +22,11 @@ from numpy.typing import NDArray
 
 from quad_nav.costmap.cost_grid import shift
 from quad_nav.costmap.observation import ObservationBuffer
-from quad_nav.costmap.obstacle import ObstacleLayer, ObstacleLayerParams
+from quad_nav.costmap.obstacle import ObstacleLayer, ObstacleLayerParams, combination_choice
+from quad_nav.costmap.voxel_kernel import RayLimits, VoxelGrid, clear_voxel_rays, mark_voxels
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
-from quad_nav.kernels.voxels import RayLimits, VoxelGrid, clear_voxel_rays, mark_voxels
+from quad_nav.parameter import POSITIVE, deviation, fixed_flag, positive, signed, whole
 
 
 @dataclass(frozen=True)
@@ -33,11 +34,6 @@ class VoxelLayerParams(ObstacleLayerParams):
     """Parameters of ``costmap_2d::VoxelLayer``.
 
     Attributes:
-        origin_z_m: Lower border of the voxels.
-        z_resolution_m: Height of a voxel.
-        z_voxels: Voxels in a column.
-        unknown_threshold: Most unknown voxels of a column that is not unknown.
-        mark_threshold: Most marked voxels of a column that is no obstacle.
         clip_voxel_rays: Cut rays at all borders of the voxels, so that they clear up to there,
             and draw the cells around the sensor; False restores upstream behaviour, where rays
             whose end is above the voxels, or by rounding below them, clear nothing.
@@ -46,14 +42,22 @@ class VoxelLayerParams(ObstacleLayerParams):
             where every reconfiguration empties the layer, and old obstacles stay drawn.
     """
 
-    origin_z_m: float = 0.0
-    z_resolution_m: float = 0.2
-    z_voxels: int = 10
-    unknown_threshold: int = 15
-    mark_threshold: int = 0
-    publish_voxel_map: bool = False
-    clip_voxel_rays: bool = True
-    redraw_emptied_voxels: bool = True
+    origin_z_m: float = signed("origin_z", 0.0, "metres", 0, None, "Lower border of the voxels.")
+    z_resolution_m: float = positive("z_resolution", 0.2, "metres", 0, 50, "Height of a voxel.")
+    z_voxels: int = whole("z_voxels", 10, "", 0, 16, "Voxels in a column.", domain=POSITIVE)
+    unknown_threshold: int = whole(
+        "unknown_threshold", 15, "", 0, 16, "Most unknown voxels of a column that is known."
+    )
+    mark_threshold: int = whole(
+        "mark_threshold", 0, "", 0, 16, "Most marked voxels of a column that is free."
+    )
+    combination_method: int = combination_choice()
+
+    publish_voxel_map: bool = fixed_flag(
+        "publish_voxel_map", False, "Publish the marked voxels as markers."
+    )
+    clip_voxel_rays: bool = deviation()
+    redraw_emptied_voxels: bool = deviation()
 
     @property
     def bytes_per_cell(self) -> int:

@@ -45,11 +45,15 @@ def is_shipped(name: str) -> bool:
 
 
 def _config_names() -> List[str]:
-    return sorted(folder.name for folder in shipped("config").iterdir() if folder.is_dir())
+    return sorted(
+        path.stem for path in shipped("config").iterdir() if path.is_dir() or path.suffix == ".yaml"
+    )
 
 
 def config_folder(name: str) -> Path:
     """Folder of a configuration: a folder's path or the name of a shipped configuration.
+
+    A shipped configuration may also be a file, an overlay on the folder ``default`` beside it.
 
     Raises:
         InputError: There is neither.
@@ -59,7 +63,8 @@ def config_folder(name: str) -> Path:
         return path
     names = _config_names()
     if name in names:
-        return shipped("config", name)
+        folder = shipped("config") / name
+        return folder if folder.is_dir() else folder.with_suffix(".yaml")
     near = nearest(name, names)
     hint = f"did you mean {near}?" if near else f"there are {', '.join(names)}"
     raise InputError(

@@ -26,7 +26,6 @@ from dataclasses import dataclass
 from typing import List, Mapping, Sequence, Tuple
 
 from quad_nav.config import Configuration
-from quad_nav.peers.links import LinkOutages
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.simulation_params import SimulationParams
@@ -46,7 +45,6 @@ class LoopSetup:
         seed: Of jitter, noise and drift.
         start_step: Step at which the clock starts.
         gui: Open the engine's window.
-        links: Outages of the links over which robots hear each other.
     """
 
     scene: Scene
@@ -57,7 +55,6 @@ class LoopSetup:
     seed: int = 0
     start_step: int = 0
     gui: bool = False
-    links: LinkOutages = LinkOutages()
 
 
 def offline_setup(setup: FlightSetup) -> LoopSetup:
@@ -69,7 +66,6 @@ def offline_setup(setup: FlightSetup) -> LoopSetup:
         dict(enumerate(setup.configurations)),
         setup.steps_per_scan,
         setup.seed,
-        links=setup.links,
     )
 
 

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from quad_nav.config import Configuration
 from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import GridSpec
 from quad_nav.loop.navigator_group import LocatedScan, LoopRobot, NavigatorGroup
 from quad_nav.navigator.tick import State
 from quad_nav.peers.right_of_way import YieldDecision
-from quad_nav.tracking.tracks import Tracks
 
 PLAN, LOCAL_PLAN, SCAN, TRACK = "plan", "local_plan", "scan", "track"
 GLOBAL_COSTMAP, LOCAL_COSTMAP = "global_costmap", "local_costmap"
@@ -62,16 +62,14 @@ class CostmapView:
 
 @dataclass(frozen=True)
 class TrackView:
-    """The tracks and suspects of a robot's tracker.
+    """The moving obstacles that a robot tracks.
 
     Attributes:
-        tracks: Tracks and suspects, in the tracker's frame.
-        unseen_s: float64[n], times for which the tracks have not been seen.
+        tracks: Tracks and suspects, in the local costmap's frame.
         map_from_frame: Pose of the frame in ``map``.
     """
 
     tracks: Tracks
-    unseen_s: NDArray[np.float64]
     map_from_frame: Pose2D
 
 
@@ -200,8 +198,8 @@ def _costmap(robot: LoopRobot, costmap: LayeredCostmap, now_s: float) -> Costmap
 
 
 def _track(robot: LoopRobot, now_s: float) -> Optional[TrackView]:
-    tracker = robot.tracker
-    tracker.end_unseen(now_s)
-    if not tracker.tracks.any_may_move:
+    tracks = robot.scan_filters.tracks(now_s)
+    if tracks is None or not tracks.any_may_move:
         return None
-    return TrackView(tracker.tracks, tracker.unseen_s, robot.map_from(tracker.frame, now_s))
+    frame = robot.navigator.local_costmap.params.global_frame
+    return TrackView(tracks, robot.map_from(frame, now_s))

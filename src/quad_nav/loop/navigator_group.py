@@ -24,12 +24,15 @@ from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, sinks_of
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.loop import LoopSetup
 from quad_nav.navigator.tick import RobotPoses, Tick
-from quad_nav.peers.links import PeerLinks
 from quad_nav.peers.peer import Intention, Peer, idle_priority
 from quad_nav.plan.global_planner import SearchPlanner
 from quad_nav.plan.navfn import Navfn
 from quad_nav.plan.wavefront import Wavefront
-from quad_nav.scenario.assembly import build_navigator, reconfigure_robot
+from quad_nav.scenario.assembly import (
+    build_navigator,
+    build_scan_filters,
+    reconfigure_robot,
+)
 from quad_nav.scenario.scene_map import SceneMaps
 from quad_nav.sim.casters import Lidars
 from quad_nav.sim.lidar import base_from_lidar
@@ -37,7 +40,6 @@ from quad_nav.sim.odometry import OdomFrames, pose_in
 from quad_nav.sim.robot_state import RobotState, RobotStates
 from quad_nav.sim.simulation_params import STEPS_PER_S
 from quad_nav.timing import is_due
-from quad_nav.tracking.tracker import ObstacleTracker
 
 LocatedScan = Tuple[Scan, Pose3D]
 """A scan and ``map_from_lidar``, the LIDAR's pose at its stamp."""
@@ -70,7 +72,7 @@ class LoopRobot:
 
     Attributes:
         navigator: The navigator.
-        tracker: The tracker of moving obstacles.
+        scan_filters: Filters of its scans.
         intakes: Intakes of the robot's sensors.
         waiting_goal: The last goal that was sent, in ``map``, until the navigator takes it.
         due_s: Time before which no tick is due, unless a goal waits. Who changes the navigator
@@ -102,13 +104,14 @@ class LoopRobot:
         self.cycle_wall_s: Optional[float] = None
         self._number, self._frames, self._start_s = number, frames, start_s
         costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
-        self.tracker = ObstacleTracker(configuration.tracker, costmaps[1].params.global_frame)
-        self._intake = ScanIntake(sinks_of(costmaps), configuration.scan_validator, self.tracker)
+        self.scan_filters = build_scan_filters(configuration)
+        local_frame = costmaps[1].params.global_frame
+        self._intake = ScanIntake(sinks_of(costmaps), self.scan_filters, local_frame)
         self.intakes = [self._intake]
 
     def reconfigure(self, configuration: Configuration) -> None:
         """Change every parameter that may change in flight."""
-        reconfigure_robot(configuration, self.navigator, self.tracker, self.intakes)
+        reconfigure_robot(configuration, self.navigator, self.scan_filters, self.intakes)
         self.due_s = -math.inf
 
     def add_scan(self, scan: Scan, map_from_lidar: Pose3D, now_s: float) -> str:
@@ -152,8 +155,8 @@ class LoopRobot:
         map_from_global = self.map_from_global(now_s)
         if map_from_global != _IDENTITY:
             peers = [peer.relative_to(map_from_global) for peer in peers]
-        self.tracker.end_unseen(now_s)
-        tick = self.navigator.tick(now_s, located, state.twist, peers, self.tracker.active_tracks)
+        tracks = self.scan_filters.tracks(now_s)
+        tick = self.navigator.tick(now_s, located, state.twist, peers, tracks)
         self.due_s = -math.inf if self.navigator.has_work else self.navigator.next_due_s
         self._remember(tick)
         return tick, located
@@ -238,7 +241,6 @@ class NavigatorGroup:
         self._lidars = lidars
         self._start_s = setup.start_step / STEPS_PER_S
         self._frames = self._frames_of(setup.seed)
-        self._links = PeerLinks(setup.links, setup.seed)
         self.lidar_enabled = np.ones(len(setup.names), dtype=bool)
         self.intentions = [Intention(idle_priority(n)) for n in range(len(setup.names))]
         self.last_scans: Dict[int, LocatedScan] = {}
@@ -354,7 +356,6 @@ class NavigatorGroup:
         self._lidars, self._start_s, self._frames = lidars, now_s, self._frames_of(seed)
         for robot in self.robots.values():
             robot.reset(self._frames, now_s, jumped_back)
-        self._links = PeerLinks(self.setup.links, seed)
 
     def close(self) -> None:
         """Free what a subclass holds; nothing is called afterwards."""
@@ -378,9 +379,7 @@ class NavigatorGroup:
             for robot in np.flatnonzero(is_near.any(axis=0)).tolist()
         }
         return {
-            robot: self._links.hear(
-                robot, {other: peers[other] for other in np.flatnonzero(row).tolist()}, now_s
-            )
+            robot: [peers[other] for other in np.flatnonzero(row).tolist()]
             for robot, row in zip(robots, is_near)
         }
 

@@ -9,42 +9,42 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Optional
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.control.controller import Control, LocalPlanner
+from quad_nav.control.controller import LocalPlanner
 from quad_nav.control.escape import escape
-from quad_nav.control.plan_follower import PlanFollower
-from quad_nav.control.prediction import NO_DISCS
 from quad_nav.costmap.layered import LayeredCostmap
-from quad_nav.errors import ControlError, NoValidTrajectory
+from quad_nav.errors import ControlError
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.kernels.moving_discs import MovingDiscs
 from quad_nav.navigator.parameter_limiter import ParameterLimiter
 from quad_nav.navigator.tick import RobotPoses, Tick
+from quad_nav.parameter import number
 from quad_nav.recovery import ParameterLimit
 from quad_nav.timing import StallTimer
-from quad_nav.tracking.tracks import Tracks
 
 
 @dataclass(frozen=True)
 class ProgressParams:
     """Parameters of the progress checker.
 
-    Attributes:
-        timeout_s: Seconds within ``distance_m`` until a new plan, and as many again until
-            the recoveries; 0 disables the checker, as upstream.
-        distance_m: A robot that has moved so far makes progress.
-        stuck_cost_factor: Factor of the obstacle weight from the new plan on, until the
-            robot has moved by the oscillation distance; 1 keeps the weight.
+    A robot that stays within ``distance_m`` for ``timeout_s`` gets a new plan; from then on
+    ``stuck_cost_factor`` weighs obstacles less until it has moved by the oscillation distance.
+    After the same time again it runs the recoveries. A time-out of 0 disables the checker.
     """
 
-    timeout_s: float = 10.0
-    distance_m: float = 0.1
-    stuck_cost_factor: float = 0.1
+    timeout_s: float = number(
+        "progress_timeout", 10.0, "seconds", 0, 100, "Time stuck until a new plan.", upstream=0.0
+    )
+    distance_m: float = number(
+        "progress_distance", 0.1, "metres", 0, 10, "Movement that is progress.", own=True
+    )
+    stuck_cost_factor: float = number(
+        "stuck_cost_factor", 0.1, "", 0, 1, "Factor of occdist_scale if stuck.", upstream=1.0
+    )
 
 
 class StuckAction(enum.Enum):
@@ -112,14 +112,12 @@ class ControlSupervisor:
 
     Attributes:
         limiter: Limits of the planner's parameters, from recoveries and stalls.
-        tracks: Moving obstacles in the local costmap's frame, None if nothing tracks them.
         plan: float64[n, 3], the last plan, in the global costmap's frame; None without one.
     """
 
     def __init__(self, controller: LocalPlanner) -> None:
         """Supervise a local planner that has no plan yet."""
         self.limiter = ParameterLimiter(controller)
-        self.tracks: Optional[Tracks] = None
         self.plan: Optional[NDArray[np.float64]] = None
         self._controller = controller
         self._last_valid_s = -math.inf
@@ -183,50 +181,28 @@ class ControlSupervisor:
         return action
 
     def compute_velocity(
-        self,
-        tick: Tick,
-        costmap: LayeredCostmap,
-        poses: RobotPoses,
-        velocity: Twist2D,
-        moving: MovingDiscs = NO_DISCS,
+        self, tick: Tick, costmap: LayeredCostmap, poses: RobotPoses, velocity: Twist2D
     ) -> bool:
         """Compute a command; return False and warn if the local planner has none.
-
-        The robot waits where only what moves leaves no legal trajectory.
 
         Args:
             tick: The step; it takes command and warning.
             costmap: The local costmap.
             poses: Poses of the robot in the costmaps' frames.
             velocity: Velocity of the robot, in its own frame.
-            moving: Moving obstacles, in the local costmap's frame; planners of other packages
-                do not know them.
         """
+        local_from_global = poses.local_from_global
+        assert poses.in_local is not None and local_from_global is not None
         try:
-            tick.control = self._judged_control(costmap, poses, velocity, moving)
+            tick.control = self._controller.compute_velocity(
+                costmap.spec, costmap.costs, poses.in_local, velocity, local_from_global
+            )
         except ControlError as error:
             tick.warnings.append(str(error))
             return False
-        tick.command = tick.control.command
+        tick.steer(tick.control.command)
         self._last_valid_s = tick.now_s
         return True
-
-    def _judged_control(
-        self, costmap: LayeredCostmap, poses: RobotPoses, velocity: Twist2D, moving: MovingDiscs
-    ) -> Control:
-        controller, local_from_global = self._controller, poses.local_from_global
-        assert poses.in_local is not None and local_from_global is not None
-        state = costmap.spec, costmap.costs, poses.in_local, velocity, local_from_global
-        if not isinstance(controller, PlanFollower):
-            return controller.compute_velocity(*state)
-        controller.moving = moving
-        try:
-            return controller.compute_velocity(*state)
-        except NoValidTrajectory:
-            if not moving.discs.shape[1]:
-                raise
-            controller.moving = NO_DISCS
-            return replace(controller.compute_velocity(*state), command=Twist2D())
 
     def is_patience_exhausted(self, now_s: float, patience_s: float) -> bool:
         """Return whether the local planner has had no command for too long."""

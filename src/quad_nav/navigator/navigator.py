@@ -16,10 +16,19 @@ from numpy.typing import NDArray
 from quad_nav.control.controller import LocalPlanner
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.map_edge import closed_edge
+from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.navigator.command_filter import (
+    Command,
+    CommandFilter,
+    CommandFilters,
+    Situation,
+    StopReason,
+)
+from quad_nav.navigator.control_supervisor import ControlSupervisor
 from quad_nav.navigator.costmap_updates import CostmapUpdates
 from quad_nav.navigator.params import NavigatorParams
-from quad_nav.navigator.recovery_sequence import NamedRecovery
+from quad_nav.navigator.recovery_sequence import NamedRecovery, RecoverySequence
 from quad_nav.navigator.state_machine import StateMachine
 from quad_nav.navigator.tick import RobotPoses, State, Tick
 from quad_nav.peers.coordinator import PeerCoordinator
@@ -27,7 +36,6 @@ from quad_nav.peers.peer import Peer
 from quad_nav.peers.peer_tracker import CRUISE_MPS
 from quad_nav.plan.planner import GlobalPlanner, plan_near
 from quad_nav.timing import Schedule
-from quad_nav.tracking.tracks import Tracks
 
 _IDLE_CHECK_HZ = 4.0  # of whether an idle robot is on the path of a peer
 
@@ -43,6 +51,7 @@ class Navigator:
         local_costmap: Costmap of the local planner.
         controller: The local planner.
         peers: Coordination with the other robots.
+        filters: The command filters.
     """
 
     def __init__(
@@ -54,6 +63,7 @@ class Navigator:
         controller: LocalPlanner,
         recoveries: Sequence[NamedRecovery],
         peers: PeerCoordinator,
+        filters: Sequence[CommandFilter] = (),
     ) -> None:
         """Create an idle navigator.
 
@@ -65,23 +75,20 @@ class Navigator:
             controller: The local planner.
             recoveries: The recovery behaviours in the order in which they run.
             peers: Coordination with the other robots.
+            filters: The command filters in their order.
         """
         self.global_costmap, self.local_costmap = global_costmap, local_costmap
         self.controller = controller
         self.peers = peers
-        self._updates = CostmapUpdates(global_costmap, local_costmap)
+        self.filters = CommandFilters(filters, params.controller_frequency_hz)
+        costmaps = global_costmap, local_costmap
+        self._updates = CostmapUpdates(*costmaps)
+        self._control = ControlSupervisor(controller)
+        self._recovery = RecoverySequence(recoveries, *costmaps)
         self._machine = StateMachine(
-            params,
-            global_costmap,
-            local_costmap,
-            self._updates,
-            planner,
-            controller,
-            recoveries,
-            peers,
+            params, *costmaps, self._updates, planner, self._control, self._recovery, peers
         )
         self._idle_check = Schedule(_IDLE_CHECK_HZ)
-        self._idle_guard = Schedule(params.controller_frequency_hz)
         self._started = False
         self._stop_wanted = False
 
@@ -98,12 +105,12 @@ class Navigator:
     @property
     def recoveries(self) -> Tuple[NamedRecovery, ...]:
         """The recovery behaviours in the order in which they run."""
-        return self._machine.recovery.recoveries
+        return self._recovery.recoveries
 
     @property
     def recoveries_done(self) -> int:
         """Number of recovery behaviours that have run for what fails now."""
-        return self._machine.recovery.done
+        return self._recovery.done
 
     @property
     def state(self) -> State:
@@ -127,7 +134,7 @@ class Navigator:
 
     def set_controller_params(self, params: Any) -> None:
         """Change the local planner's parameters; limits of recoveries stay in force."""
-        self._machine.control.limiter.set_params(params)
+        self._control.limiter.set_params(params)
 
     # -- goals ---------------------------------------------------------------------------
 
@@ -157,11 +164,10 @@ class Navigator:
         if not self._started:
             return -math.inf
         due_s = math.inf if self._costmaps_rest else self._updates.due_s
-        due_s = min(due_s, self._machine.control.limiter.due_s)
-        if self._machine.state is not State.IDLE:
+        due_s = min(due_s, self._control.limiter.due_s)
+        if self.state is not State.IDLE:
             return min(due_s, self._machine.due_s)
-        if self.params.evasion.avoid_moving_obstacles:
-            due_s = min(due_s, self._idle_guard.due_s)
+        due_s = min(due_s, self.filters.idle_due_s)
         return min(due_s, self._idle_check.due_s) if self.peers.params.avoid_peers else due_s
 
     @property
@@ -177,7 +183,8 @@ class Navigator:
         self.peers.restart()
         self._updates.start(now_s)
         self.clear_costmaps(now_s)
-        self._machine.control.limiter.lift()
+        self._control.limiter.lift()
+        self.filters.reset()
         if goal is not None:
             self.set_goal(goal, now_s)
 
@@ -198,7 +205,6 @@ class Navigator:
             peers: The other robots with a known pose.
             tracks: Moving obstacles in the local costmap's frame, None if nothing tracks them.
         """
-        self._machine.control.tracks = tracks
         if not self._started:
             self._started = True
             self._start_idle_checks(now_s)
@@ -208,37 +214,89 @@ class Navigator:
         if not self._costmaps_rest:
             self._updates.update(tick, poses)
         if poses.in_global is not None:
-            self._machine.control.limiter.check(now_s, poses.in_global)
-        if self._stop_wanted:
-            self._stop_wanted = False
-            tick.command = Twist2D()
-        if self.state is State.IDLE and self._idle_check.pop(now_s):
-            self._make_room_when_idle(tick, poses.in_global)
-        if self.state is not State.IDLE:
-            self._machine.run(tick, poses, velocity)
-        self._evade(tick, poses, velocity)
-        self._machine.limit_command(tick, poses.in_global, velocity)
+            self._control.limiter.check(now_s, poses.in_global)
+        self._propose(tick, poses, velocity)
+        self._filter(tick, poses, velocity, tracks)
+        self._stop_without_data(tick, poses)  # last: nothing overrides it
+        if tick.command is not None:
+            self.filters.last = tick.command
+        if tick.is_stopped:
+            self.filters.reset()
         tick.state = self.state
         tick.yielding = self.peers.decision
         return tick
 
+    def _propose(self, tick: Tick, poses: RobotPoses, velocity: Twist2D) -> None:
+        """Plan, control and recover, as far as it is due."""
+        if self._stop_wanted:
+            self._stop_wanted = False
+            tick.halt(StopReason.CANCELLED)
+        if self.state is State.IDLE and self._idle_check.pop(tick.now_s):
+            self._make_room_when_idle(tick, poses.in_global)
+        if self.state is not State.IDLE:
+            self._machine.run(tick, poses, velocity)
+
+    def _filter(
+        self, tick: Tick, poses: RobotPoses, velocity: Twist2D, tracks: Optional[Tracks]
+    ) -> None:
+        """Pass the command through the filters."""
+        frequency_hz, is_idle = self.params.controller_frequency_hz, self.state is State.IDLE
+        is_idle_cycle = self.filters.pop_idle_cycle(tick.now_s, frequency_hz) and is_idle
+        if tick.is_stopped or poses.local_from_global is None:
+            return
+        given = None if tick.command is None else Command(tick.command, tick.stop)
+        if given is None:
+            if not is_idle_cycle or self._machine.missing_data(tick.now_s, poses):
+                return
+        command = self.filters.filter(given, self._situation(tick, poses, velocity, tracks))
+        if command is None:
+            return
+        tick.command, tick.stop = command.velocity, command.stop
+        tick.limited_by = command.limited_by
+        if tick.limited_by:
+            self._machine.hold_back(tick, poses.in_global)
+
+    def _situation(
+        self, tick: Tick, poses: RobotPoses, velocity: Twist2D, tracks: Optional[Tracks]
+    ) -> Situation:
+        assert poses.in_local is not None and poses.in_global is not None
+        local_from_global = poses.local_from_global
+        assert local_from_global is not None
+        follows = tick.control is not None and self.state is State.CONTROLLING
+        return Situation(
+            tick.now_s,
+            1.0 / self.params.controller_frequency_hz,
+            poses.in_local,
+            poses.in_global,
+            local_from_global,
+            velocity,
+            self.filters.last,
+            self._control.plan if follows else None,
+            self.local_costmap,
+            self._control.limiter.usual,
+            tracks,
+            self.peers,
+        )
+
+    def _stop_without_data(self, tick: Tick, poses: RobotPoses) -> None:
+        """Stop a robot that does not know where it is or what is around it."""
+        command = tick.command or self.filters.last
+        if command.is_zero or (tick.command is None and self.state is not State.IDLE):
+            return  # it stands, or the next control cycle stops it
+        if self._recovery.is_running and not self._machine.stops_without_data:
+            return  # as upstream
+        missing = self._machine.missing_data(tick.now_s, poses)
+        if missing:
+            self._machine.stop_without_data(tick, missing)
+
     def _start_idle_checks(self, now_s: float) -> None:
         self._idle_check.start(now_s)
-        self._idle_guard.start(now_s)
-
-    def _evade(self, tick: Tick, poses: RobotPoses, velocity: Twist2D) -> None:
-        """Guard the command of a control cycle; without a goal, at the same frequency."""
-        if not self.params.evasion.avoid_moving_obstacles:
-            return
-        self._idle_guard.set_frequency(self.params.controller_frequency_hz, tick.now_s)
-        is_due = self._idle_guard.pop(tick.now_s) and self.state is State.IDLE
-        if is_due or tick.command is not None:
-            self._machine.evade(tick, poses, velocity)
+        self.filters.start(now_s)
 
     def _observe_peers(
         self, tick: Tick, poses: RobotPoses, peers: Sequence[Peer], tracks: Optional[Tracks]
     ) -> None:
-        cruise_mps = getattr(self._machine.control.limiter.usual, "max_vel_x_mps", CRUISE_MPS)
+        cruise_mps = getattr(self._control.limiter.usual, "max_vel_x_mps", CRUISE_MPS)
         tick.notes += self.peers.observe(
             tick.now_s, poses.in_global, poses.local_from_global, peers, cruise_mps, tracks
         )

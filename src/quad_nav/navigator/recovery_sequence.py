@@ -90,7 +90,7 @@ class RecoverySequence:
         step = self._active.step(self._context(tick, poses))
         self.due_s = tick.now_s + self._active.period_s
         if step.command is not None:
-            tick.command = step.command
+            tick.steer(step.command)
         if step.message:
             tick.warnings.append(step.message)
         if step.limit is not None and poses.in_global is not None:

@@ -9,22 +9,18 @@ lists the differences from upstream.
 from __future__ import annotations
 
 import math
-from typing import Optional, Sequence
+from typing import Optional
 
-from quad_nav.control.controller import LocalPlanner
-from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
-from quad_nav.control.prediction import NO_DISCS
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.map_edge import closed_edge
 from quad_nav.errors import PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.kernels.moving_discs import MovingDiscs
+from quad_nav.navigator.command_filter import StopReason
 from quad_nav.navigator.control_supervisor import ControlSupervisor, StuckAction, escape_command
 from quad_nav.navigator.costmap_updates import CostmapUpdates
-from quad_nav.navigator.evasion_guard import EvasionGuard, speed_limits
 from quad_nav.navigator.params import NavigatorParams
 from quad_nav.navigator.plan_search import PlanSearch
-from quad_nav.navigator.recovery_sequence import NamedRecovery, RecoverySequence
+from quad_nav.navigator.recovery_sequence import RecoverySequence
 from quad_nav.navigator.tick import Outcome, RobotPoses, State, Tick, Trigger
 from quad_nav.peers.coordinator import PeerCoordinator
 from quad_nav.plan.planner import GlobalPlanner
@@ -39,9 +35,6 @@ class StateMachine:
         planner: The global planner; it may be replaced in flight.
         state: The state.
         goal: Goal pose in the global costmap's frame, None if the robot is idle.
-        control: Supervisor of the local planner.
-        recovery: The recovery behaviours.
-        guard: Evasion of moving obstacles.
     """
 
     def __init__(
@@ -51,8 +44,8 @@ class StateMachine:
         local_costmap: LayeredCostmap,
         updates: CostmapUpdates,
         planner: GlobalPlanner,
-        controller: LocalPlanner,
-        recoveries: Sequence[NamedRecovery],
+        control: ControlSupervisor,
+        recovery: RecoverySequence,
         peers: PeerCoordinator,
     ) -> None:
         """Create an idle state machine.
@@ -63,18 +56,16 @@ class StateMachine:
             local_costmap: Costmap of the local planner.
             updates: Updates of both costmaps.
             planner: The global planner.
-            controller: The local planner.
-            recoveries: The recovery behaviours in the order in which they run.
+            control: Supervisor of the local planner.
+            recovery: The recovery behaviours.
             peers: Coordination with the other robots.
         """
         self.params = params
         self.planner = planner
         self.state = State.IDLE
         self.goal: Optional[Pose2D] = None
-        self.control = ControlSupervisor(controller)
-        self.recovery = RecoverySequence(recoveries, global_costmap, local_costmap)
+        self._control, self._recovery = control, recovery
         self._global, self._local = global_costmap, local_costmap
-        self.guard = EvasionGuard(params.evasion, local_costmap, self._period_s)
         self._updates = updates
         self._peers = peers
         self._search = PlanSearch(params.planner_frequency_hz)
@@ -90,10 +81,10 @@ class StateMachine:
             self._cycle.start(now_s)
             self._starts_from_rest = True
         self.goal = goal
-        self.recovery.reset()
-        self.control.reset()
+        self._recovery.reset()
+        self._control.reset()
         self._begin_planning(now_s)
-        self.control.start(now_s)
+        self._control.start(now_s)
 
     def _finish(self, tick: Tick, outcome: Outcome) -> None:
         if not self._peers.is_yield_manoeuvre:
@@ -102,7 +93,7 @@ class StateMachine:
             self._peers.end_manoeuvre(outcome.succeeded)
             failed = f"yielding manoeuvre failed: {outcome.text}"
             tick.notes.append("back at its parking pose" if outcome.succeeded else failed)
-        tick.command = Twist2D()
+        tick.halt(StopReason.GOAL_ENDED)
         self.end_goal()
 
     def end_goal(self) -> None:
@@ -110,7 +101,7 @@ class StateMachine:
         self.state = State.IDLE
         self.goal = None
         self._search.drop()
-        self.recovery.stop()
+        self._recovery.stop()
         self._peers.end_goal()
         self._cycle.due_s = math.inf
 
@@ -121,7 +112,7 @@ class StateMachine:
         """Time at which ``run`` has something to do; +inf for an idle robot."""
         if self.state is State.IDLE:
             return math.inf
-        due_s = min(self._cycle.due_s, self.recovery.due_s)
+        due_s = min(self._cycle.due_s, self._recovery.due_s)
         if not self.params.command_in_first_cycle:
             return min(due_s, self._search.thread.due_s)
         return min(due_s, self._search.due_s) if self.state is State.CONTROLLING else due_s
@@ -142,66 +133,26 @@ class StateMachine:
         self._search.set_frequency(self.params.planner_frequency_hz, tick.now_s)
         if self._is_search_due(tick.now_s):
             self._search_plan(tick, poses.in_global)
-        if self.recovery.is_running:
-            if self._stops_without_data and self._missing_data(tick.now_s, poses):
-                self.recovery.pause(tick.now_s)
+        if self._recovery.is_running:
+            if self.stops_without_data and self.missing_data(tick.now_s, poses):
+                self._recovery.pause(tick.now_s)
             else:
                 self._step_recovery(tick, poses)
         if self._cycle.pop(tick.now_s):
             tick.cycle = True
-            self._recovery_overruns = self.recovery.is_running
+            self._recovery_overruns = self._recovery.is_running
             self._run_control_cycle(tick, poses, velocity)
             self._starts_from_rest = False
         if not self.params.command_in_first_cycle and self._search.thread.is_due(tick.now_s):
             self._search_plan(tick, poses.in_global)
 
-    def evade(self, tick: Tick, poses: RobotPoses, velocity: Twist2D) -> None:
-        """Replace a command that moving obstacles threaten; without a goal, hover or evade.
-
-        Without data nobody knows where obstacles are, and an evasion ends with a stop.
-        """
-        self.guard.params = self.params.evasion
-        self.guard.period_s = self._period_s
-        limits = speed_limits(self.control.limiter.usual)
-        if self.control.tracks is None or limits is None:
+    def hold_back(self, tick: Tick, pose: Optional[Pose2D]) -> None:
+        """Take note that a command filter holds the robot back, at a pose."""
+        self._control.restart_timers(tick.now_s)
+        if pose is None or self.state is not State.CONTROLLING:
             return
-        missing = self._missing_data(tick.now_s, poses)
-        if missing:
-            if self.guard.stop() and not tick.is_stopped:
-                self._stop_without_data(tick, missing)
-            return
-        follows = tick.control is not None and self.state is State.CONTROLLING
-        plan = self.control.plan if follows else None
-        neighbours = self._neighbours(poses, velocity)
-        self.guard.check(tick, poses, velocity, self.control.tracks, plan, limits, neighbours)
-        if tick.evades:
-            self.control.restart_timers(tick.now_s)
-
-    def _neighbours(self, poses: RobotPoses, velocity: Twist2D) -> Neighbours:
-        tracks = self.control.tracks
-        if tracks is None or not tracks.any_may_move:
-            return NO_NEIGHBOURS
-        if poses.in_global is None or poses.local_from_global is None:
-            return NO_NEIGHBOURS
-        return self._peers.neighbours(
-            poses.in_global, velocity, poses.local_from_global, self._period_s
-        )
-
-    @property
-    def _period_s(self) -> float:
-        """Time between two control cycles."""
-        return 1.0 / self.params.controller_frequency_hz
-
-    def limit_command(self, tick: Tick, pose: Optional[Pose2D], velocity: Twist2D) -> None:
-        """Limit the final command so that it cannot lead to a collision with a peer."""
-        if tick.command is None or pose is None or tick.is_stopped:
-            return
-        limited = self._peers.limit(pose, velocity, tick.command, self._period_s)
-        tick.command, tick.limited_by = limited.command, limited.limited_by
-        if limited.limited_by:
-            self.control.restart_timers(tick.now_s)
-            if self.state is State.CONTROLLING and self._peers.is_blocked(tick.now_s, pose):
-                self._begin_planning(tick.now_s)  # the peer may stand on the plan
+        if self._peers.is_blocked(tick.now_s, pose):
+            self._begin_planning(tick.now_s)  # the peer may stand on the plan
 
     # -- planning ------------------------------------------------------------------------
 
@@ -233,7 +184,7 @@ class StateMachine:
             return
         self._peers.follow_plan(tick.plan)
         self._search.succeed(tick.plan, self.state, tick.now_s)
-        if not self.recovery.is_running:
+        if not self._recovery.is_running:
             self.state = State.CONTROLLING
 
     # -- control -------------------------------------------------------------------------
@@ -242,86 +193,76 @@ class StateMachine:
         if (
             poses.in_global is not None
             and poses.in_local is not None
-            and self.control.track(tick.now_s, poses.in_global, self.params.oscillation_distance_m)
+            and self._control.track(tick.now_s, poses.in_global, self.params.oscillation_distance_m)
         ):
-            self.recovery.reset_after(Trigger.OSCILLATION)
-        missing = self._missing_data(tick.now_s, poses)
+            self._recovery.reset_after(Trigger.OSCILLATION)
+        missing = self.missing_data(tick.now_s, poses)
         if missing:
-            self._stop_without_data(tick, missing)
+            self.stop_without_data(tick, missing)
             return
         assert poses.in_global is not None
         if self._yield_to_peers(tick, poses.in_global):
             return
         plan = self._search.pop_plan()
         if plan is not None:
-            self.control.set_plan(plan)
-            self.recovery.reset_after(Trigger.PLANNING)
+            self._control.set_plan(plan)
+            self._recovery.reset_after(Trigger.PLANNING)
         if self.state is State.CONTROLLING:
             self._follow_plan(tick, poses, velocity)
-        elif self.state is State.CLEARING and not self.recovery.is_running:
+        elif self.state is State.CLEARING and not self._recovery.is_running:
             self._start_recovery(tick, poses)
         elif self.state is State.PLANNING:
             self._search.notify_thread()
             if self.params.stop_while_planning or self._starts_from_rest:
-                tick.command = Twist2D()
+                tick.halt(StopReason.NO_PLAN)
 
-    def _missing_data(self, now_s: float, poses: RobotPoses) -> str:
+    def missing_data(self, now_s: float, poses: RobotPoses) -> str:
         """Return what a robot that moves has to know and this one does not, "" if nothing."""
         if poses.in_global is None or poses.in_local is None:
             return poses.unknown_reason or "robot pose unknown"
         return self._updates.outdated_reason(now_s)
 
-    def _stop_without_data(self, tick: Tick, reason: str) -> None:
+    def stop_without_data(self, tick: Tick, reason: str) -> None:
+        """Command a stop for lack of data, and warn."""
         tick.warnings.append(f"stopping: {reason}")
-        tick.is_stopped = True
-        tick.command = Twist2D()
-        if self._stops_without_data:
-            self.control.restart_timers(tick.now_s)
+        tick.halt(StopReason.NO_DATA)
+        if self.stops_without_data:
+            self._control.restart_timers(tick.now_s)
 
     @property
-    def _stops_without_data(self) -> bool:
+    def stops_without_data(self) -> bool:
         """Without data, upstream continues recoveries, and the patience runs out."""
         return self.params.sensor_timeout_s > 0.0
 
     def _follow_plan(self, tick: Tick, poses: RobotPoses, velocity: Twist2D) -> None:
         assert poses.in_local is not None and poses.in_global is not None
         params = self.params
-        if self.control.is_goal_reached():
+        if self._control.is_goal_reached():
             if self._peers.holding_point is None:
                 self._finish(tick, Outcome(True, "Goal reached."))
             else:
-                tick.command = Twist2D()
+                tick.halt(StopReason.PEER)
             return
-        if self.control.is_oscillating(tick.now_s, params.oscillation_timeout_s):
+        if self._control.is_oscillating(tick.now_s, params.oscillation_timeout_s):
             self._enter_clearing(tick, Trigger.OSCILLATION)
             return
-        action = self.control.check_progress(
+        action = self._control.check_progress(
             tick, poses.in_global, params.progress, params.oscillation_distance_m
         )
         if action is StuckAction.RECOVER:
             self._enter_clearing(tick, Trigger.OSCILLATION)
         elif action is StuckAction.REPLAN:
-            tick.command = Twist2D()
+            tick.halt(StopReason.NO_PROGRESS)
             self._begin_planning(tick.now_s)
-        elif self.control.compute_velocity(
-            tick, self._local, poses, velocity, self._predicted(tick.now_s, poses.in_local)
-        ):
-            self.recovery.reset_after(Trigger.CONTROLLING)
-        elif self.control.is_patience_exhausted(tick.now_s, params.controller_patience_s):
+        elif self._control.compute_velocity(tick, self._local, poses, velocity):
+            self._recovery.reset_after(Trigger.CONTROLLING)
+        elif self._control.is_patience_exhausted(tick.now_s, params.controller_patience_s):
             self._enter_clearing(tick, Trigger.CONTROLLING)
         else:
-            tick.command = Twist2D()
+            tick.halt(StopReason.NO_TRAJECTORY)
             if params.escape_collision:
-                tick.command = escape_command(self._local, poses.in_local)
+                tick.steer(escape_command(self._local, poses.in_local))
             self._begin_planning(tick.now_s)
-
-    def _predicted(self, now_s: float, pose: Pose2D) -> MovingDiscs:
-        """Return the moving obstacles that rollouts are judged against."""
-        tracks, usual = self.control.tracks, self.control.limiter.usual
-        rollout_s = getattr(usual, "sim_time_s", 0.0)
-        if tracks is None or not self.params.evasion.avoid_moving_obstacles:
-            return NO_DISCS
-        return self.guard.predict(now_s, pose, tracks, rollout_s)
 
     # -- peers ---------------------------------------------------------------------------
 
@@ -335,10 +276,10 @@ class StateMachine:
             self._begin_planning(tick.now_s)
             self._search_plan(tick, pose)
         if self._peers.decision is not None:
-            self.control.restart_timers(tick.now_s)
+            self._control.restart_timers(tick.now_s)
         if not self._peers.waits_at(pose):
             return False
-        tick.command = Twist2D()
+        tick.halt(StopReason.PEER)
         return True
 
     # -- recovery ------------------------------------------------------------------------
@@ -348,21 +289,21 @@ class StateMachine:
             self._finish(tick, Outcome(False, trigger.value))
             return
         self.state = State.CLEARING
-        self.recovery.trigger = trigger
+        self._recovery.trigger = trigger
         if trigger is Trigger.PLANNING:
             self._search.thread.stop()
-        tick.command = Twist2D()
+        tick.halt(StopReason.RECOVERY)
 
     def _start_recovery(self, tick: Tick, poses: RobotPoses) -> None:
-        assert self.recovery.trigger is not None
-        if self.params.recovery_behavior_enabled and self.recovery.start(tick, poses):
+        assert self._recovery.trigger is not None
+        if self.params.recovery_behavior_enabled and self._recovery.start(tick, poses):
             self._step_recovery(tick, poses)
         else:
-            self._finish(tick, Outcome(False, self.recovery.trigger.value))
+            self._finish(tick, Outcome(False, self._recovery.trigger.value))
 
     def _step_recovery(self, tick: Tick, poses: RobotPoses) -> None:
-        if self.recovery.step(tick, poses, self.control.limiter):
-            self.control.end_recovery(tick.now_s)
+        if self._recovery.step(tick, poses, self._control.limiter):
+            self._control.end_recovery(tick.now_s)
             self._begin_planning(tick.now_s, wakes_thread=False)
             if self._recovery_overruns and not self.params.command_in_first_cycle:
                 self._cycle.start(tick.now_s)  # upstream's recoveries delay its control cycles

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from quad_nav.control.controller import Control
 from quad_nav.costmap.cost_grid import Window
 from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.navigator.command_filter import StopReason
 from quad_nav.peers.right_of_way import YieldDecision
 
 _SAME_FRAME = Pose2D(0.0, 0.0, 0.0)
@@ -89,6 +90,7 @@ class Tick:
         windows: Cells that costmap updates changed, by costmap: "global", "local".
         cycle: A control cycle ran.
         command: Command to publish now, if any.
+        stop: Why that command is a stop, None if it is none.
         plan: New global plan, float64[n, 3] of (x_m, y_m, yaw_rad) in the global costmap's
             frame.
         planning_failed: Why the search for a plan failed, "" if it did not.
@@ -96,11 +98,10 @@ class Tick:
         recovery: The recovery behaviour that started.
         outcome: End of the goal.
         yielding: The decision to yield that is in force.
-        limited_by: Name of the peer that limited the command, "" if none did.
-        evades: The command evades moving obstacles.
+        limited_by: Name of the peer or thing for which a command filter holds the robot back, "" if
+            none does.
         notes: Messages for the log that tell no fault.
         warnings: Messages for the log that tell a fault.
-        is_stopped: The robot stops for lack of data; the first warning says of which.
     """
 
     now_s: float
@@ -108,6 +109,7 @@ class Tick:
     windows: Dict[str, Window] = field(default_factory=dict)
     cycle: bool = False
     command: Optional[Twist2D] = None
+    stop: Optional[StopReason] = None
     plan: Optional[NDArray[np.float64]] = None
     planning_failed: str = ""
     control: Optional[Control] = None
@@ -115,7 +117,18 @@ class Tick:
     outcome: Optional[Outcome] = None
     yielding: Optional[YieldDecision] = None
     limited_by: str = ""
-    evades: bool = False
     notes: List[str] = field(default_factory=list)
     warnings: List[str] = field(default_factory=list)
-    is_stopped: bool = False
+
+    @property
+    def is_stopped(self) -> bool:
+        """True if the robot stops for lack of data; the first warning says of which."""
+        return self.stop is StopReason.NO_DATA
+
+    def halt(self, reason: StopReason) -> None:
+        """Command a stop."""
+        self.command, self.stop = Twist2D(), reason
+
+    def steer(self, command: Twist2D) -> None:
+        """Command a velocity in the robot's frame."""
+        self.command, self.stop = command, None

@@ -1,8 +1,8 @@
 """Coordination of one robot with its peers.
 
-The navigator asks four things: ``observe`` updates the peers, ``decide`` says whether the robot
-yields, ``neighbours`` returns the peers for evasions, ``limit`` keeps a command inside the robot's
-Voronoi cell. A robot without a goal yields by a manoeuvre: to a holding point, and back.
+The navigator asks three things: ``observe`` updates the peers, ``decide`` says whether the robot
+yields, ``limit`` keeps a command inside the robot's Voronoi cell. A robot without a goal yields by
+a manoeuvre: to a holding point, and back.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from typing import List, Optional, Sequence, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.control.neighbours import Neighbours
 from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.peers.peer import (
     IDLE_PRIORITY,
@@ -25,14 +25,14 @@ from quad_nav.peers.peer import (
     resample,
 )
 from quad_nav.peers.peer_costs import PeerCosts
+from quad_nav.peers.peer_params import PeerParams
 from quad_nav.peers.peer_tracker import PeerTracker
 from quad_nav.peers.right_of_way import STRANGER, Yield, YieldDecision
 from quad_nav.peers.roundabout import Roundabout
 from quad_nav.peers.stand_off import StandOff
-from quad_nav.peers.voronoi_cell import LimitedCommand, limit_to_cell, neighbours_of
+from quad_nav.peers.voronoi_cell import LimitedCommand, limit_to_cell
 from quad_nav.peers.yielding import YieldRules
 from quad_nav.timing import StallTimer
-from quad_nav.tracking.tracks import Tracks
 
 LATENCY_S = 0.15  # how much later than due the next command may come
 GIVE_UP_PRIORITY_AFTER_S = 15.0  # without progress
@@ -40,31 +40,6 @@ REPLAN_AFTER_S = 3.0  # of limited commands without progress
 _PROGRESS_M = 0.2
 _AT_HOLDING_POINT_M = 0.15
 _SPACING_M = 0.1  # of the points of the path in the intention
-
-
-@dataclass(frozen=True)
-class PeerParams:
-    """Parameters of the avoidance of peers, see ``docs/peers.md``.
-
-    Attributes:
-        avoid_peers: Avoid the peers whose poses are known; False restores upstream behaviour.
-        margin_m: Distance that each of two robots keeps its footprint from the bisector
-            between them; hulls stay twice as far apart.
-        timeout_s: Age from which the state of a peer is ignored.
-        yield_when_idle: A robot without a goal leaves the path of a peer, and comes back.
-        roundabouts: Where four robots or more meet, all keep right of a circle.
-        yield_to_strangers: Make room for a tracked obstacle that keeps the robot from its goal.
-        stranger_patience_s: Time without progress until the robot makes room for a stranger; a
-            random time of up to twice as much is added.
-    """
-
-    avoid_peers: bool = True
-    margin_m: float = 0.05
-    timeout_s: float = 0.5
-    yield_when_idle: bool = True
-    roundabouts: bool = True
-    yield_to_strangers: bool = False
-    stranger_patience_s: float = 3.0
 
 
 @dataclass(frozen=True)
@@ -348,19 +323,6 @@ class PeerCoordinator:
             self._cell_peers,
             self._tracker.safety_radius_m,
             control_period_s + LATENCY_S,
-        )
-
-    def neighbours(
-        self, pose: Pose2D, velocity: Twist2D, local_from_map: Pose2D, control_period_s: float
-    ) -> Neighbours:
-        """Return the peers, in the local costmap's frame; other arguments are as for ``limit``."""
-        return neighbours_of(
-            pose,
-            velocity,
-            self._cell_peers,
-            self._tracker.safety_radius_m,
-            control_period_s + LATENCY_S,
-            local_from_map,
         )
 
     @property

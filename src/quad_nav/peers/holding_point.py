@@ -8,9 +8,9 @@ from typing import Optional, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.costmap.cost_grid_kernel import nearest_cell, raise_discs
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import INSCRIBED, GridSpec
-from quad_nav.kernels.peers import nearest_cell, raise_discs
 from quad_nav.peers.peer import resample
 
 COMFORTABLE = 128  # below this cost a robot has room to turn

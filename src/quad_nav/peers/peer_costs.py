@@ -19,8 +19,8 @@ from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.peer_layer import PeerArea, PeerLayer
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import LETHAL
-from quad_nav.kernels.peers import reached_in_time
 from quad_nav.peers.peer_tracker import TOLERANCE_M, PeerTracker
+from quad_nav.peers.predicted_paths import reached_in_time
 from quad_nav.peers.right_of_way import HORIZON_S, TIME_TOLERANCE_S, predict_peer
 from quad_nav.peers.roundabout import Roundabout
 

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
-from quad_nav.kernels.peers import nearest_in_time, sample_path
 from quad_nav.peers.peer import Peer
+from quad_nav.peers.predicted_paths import nearest_in_time, sample_path
 
 STRANGER = "a stranger"
 """Name of what moves and has no name, and that a robot makes room for."""

@@ -25,11 +25,11 @@ from typing import List, Optional, Sequence, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.control.neighbours import MIN_FRACTION, NO_NEIGHBOURS, Neighbours
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
 from quad_nav.peers.peer import Peer
 
 COASTING_S = 0.35
+MIN_FRACTION = 0.15  # below this part of a command the cell stops the robot
 _PARTS = 20
 _STEPS = np.arange(1, _PARTS + 1)
 _TURN_RADPS = 0.4
@@ -90,38 +90,6 @@ def limit_to_cell(
         return LimitedCommand(_turn_in_place(pose, command, nearest), nearest.name)
     vx_mps, vy_mps = fraction * command.vx_mps, fraction * command.vy_mps
     return LimitedCommand(Twist2D(vx_mps, vy_mps, fraction * command.vyaw_radps), nearest.name)
-
-
-def neighbours_of(
-    pose: Pose2D,
-    velocity: Twist2D,
-    peers: Sequence[Peer],
-    safety_radius_m: float,
-    hold_s: float,
-    local_from_map: Pose2D,
-) -> Neighbours:
-    """Return the peers, and how far a command may go towards each of them inside the cell.
-
-    Args:
-        pose: Robot pose in ``map``.
-        velocity: Current velocity in the robot's frame.
-        peers: Peers whose state is fresh.
-        safety_radius_m: Robot radius plus margin.
-        hold_s: How long a command may stay in force.
-        local_from_map: Transform from ``map`` to the frame of the local costmap.
-    """
-    if not peers:
-        return NO_NEIGHBOURS
-    coasting = COASTING_S * np.array(pose.rotate(velocity.vx_mps, velocity.vy_mps))
-    states, rooms = np.empty((len(peers), 4)), np.empty((len(peers), 3))
-    for peer, state, room in zip(peers, states, rooms):
-        dx_m, dy_m = peer.x_m - pose.x_m, peer.y_m - pose.y_m
-        away_m = max(math.hypot(dx_m, dy_m), 1e-9)
-        state[:2] = local_from_map.transform(peer.x_m, peer.y_m)
-        state[2:] = local_from_map.rotate(peer.vx_mps, peer.vy_mps)
-        room[:2] = local_from_map.rotate(dx_m / away_m, dy_m / away_m)
-        room[2] = _room_towards(dx_m, dy_m, coasting, safety_radius_m)
-    return Neighbours(states, rooms, 2.0 * safety_radius_m, hold_s)
 
 
 def _peers_in_reach(

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.costmap import collision
+from quad_nav.costmap.cost_grid_kernel import CostmapView
 from quad_nav.errors import NoPath
 from quad_nav.geometry import Pose2D, angle_difference, normalize_angle
 from quad_nav.grid import GridSpec
-from quad_nav.kernels import collision
-from quad_nav.kernels.cost_grid import CostmapView
 
 _SHARE_STEP = 0.01
 _CORNERS_NEEDED = 3

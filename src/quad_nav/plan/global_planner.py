@@ -31,10 +31,11 @@ from numpy.typing import NDArray
 from quad_nav.errors import NoPath
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
-from quad_nav.kernels import global_planner as kernel
-from quad_nav.kernels import wave as wavefront
+from quad_nav.parameter import POSITIVE, choice, fixed_flag, fixed_whole, flag, signed, whole
+from quad_nav.plan import global_planner_kernel as kernel
+from quad_nav.plan import wavefront_kernel as wavefront
 from quad_nav.plan.navfn import goal_cell_of, start_cell_of
-from quad_nav.plan.orientations import OrientationMode, with_headings
+from quad_nav.plan.orientations import ORIENTATIONS, with_headings
 from quad_nav.plan.wavefront import Wavefront
 
 Point = Tuple[float, float]
@@ -46,27 +47,37 @@ class SearchPlannerParams:
     """Parameters of ``global_planner/GlobalPlanner``.
 
     Attributes:
-        neutral_cost: Cost of a free cell.
-        cost_factor: Factor of costs of the costmap.
-        lethal_cost: Cost of an obstacle.
-        publish_scale: Highest value of the published potential.
         orientation_mode: One of ``OrientationMode``.
-        outline_map: Make the outermost cells obstacles.
     """
 
-    use_dijkstra: bool = True
-    use_quadratic: bool = True
-    use_grid_path: bool = False
-    old_navfn_behavior: bool = False
-    allow_unknown: bool = True
-    lethal_cost: int = 253
-    neutral_cost: int = 50
-    cost_factor: float = 3.0
-    orientation_mode: int = OrientationMode.FORWARD
-    orientation_window_size: int = 1
-    outline_map: bool = True
-    publish_potential: bool = True
-    publish_scale: int = 100
+    lethal_cost: int = whole("lethal_cost", 253, "", 1, 255, "Cost of an obstacle.")
+    neutral_cost: int = whole("neutral_cost", 50, "", 1, 255, "Cost of a free cell.")
+    cost_factor: float = signed("cost_factor", 3.0, "", 0.01, 5.0, "Factor of the costmap's costs.")
+    publish_potential: bool = flag("publish_potential", True, "Publish the potential.")
+    orientation_mode: int = choice(
+        "orientation_mode", 1, ORIENTATIONS, "Heading of the points of a path.", low=0, high=6
+    )
+    orientation_window_size: int = whole(
+        "orientation_window_size", 1, "", 1, 255, "Points over which a direction is taken."
+    )
+    outline_map: bool = flag(
+        "outline_map", True, "Make the outermost cells obstacles; false for a rolling costmap."
+    )
+
+    use_dijkstra: bool = fixed_flag("use_dijkstra", True, "Dijkstra's search; A* when false.")
+    use_quadratic: bool = fixed_flag(
+        "use_quadratic", True, "Potentials of a planar wave; from one neighbour when false."
+    )
+    use_grid_path: bool = fixed_flag(
+        "use_grid_path", False, "Path from cell to cell; down the gradient when false."
+    )
+    old_navfn_behavior: bool = fixed_flag(
+        "old_navfn_behavior", False, "Paths as NavfnROS has them, between corners of cells."
+    )
+    allow_unknown: bool = fixed_flag("allow_unknown", True, "Plans may cross unknown space.")
+    publish_scale: int = fixed_whole(
+        "publish_scale", 100, "Highest published potential.", low=1, high=127, domain=POSITIVE
+    )
 
 
 class SearchPlanner:

@@ -28,8 +28,9 @@ from numpy.typing import NDArray
 from quad_nav.errors import GoalOutsideMap, NoPath, StartOutsideMap
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, INSCRIBED, UNKNOWN, GridSpec
-from quad_nav.kernels import descent as kernel
-from quad_nav.kernels import wave as wavefront
+from quad_nav.parameter import fixed_flag, fixed_number
+from quad_nav.plan import descent as kernel
+from quad_nav.plan import wavefront_kernel as wavefront
 from quad_nav.plan.wavefront import NOT_REACHED, Wavefront
 
 Cell = Tuple[int, int]
@@ -39,11 +40,13 @@ Cell = Tuple[int, int]
 class NavfnParams:
     """Parameters of ``navfn/NavfnROS``."""
 
-    allow_unknown: bool = True
-    default_tolerance_m: float = 0.0
-    visualize_potential: bool = False
-    planner_window_x_m: float = 0.0  # upstream reads it and never uses it, either
-    planner_window_y_m: float = 0.0
+    allow_unknown: bool = fixed_flag("allow_unknown", True, "Plans may cross unknown space.")
+    default_tolerance_m: float = fixed_number(
+        "default_tolerance", 0.0, "metres", "Largest distance from the end of a plan to the goal."
+    )
+    visualize_potential: bool = fixed_flag("visualize_potential", False, "Publish the potential.")
+    planner_window_x_m: float = fixed_number("planner_window_x", 0.0, "metres", "Never used.")
+    planner_window_y_m: float = fixed_number("planner_window_y", 0.0, "metres", "Never used.")
 
 
 class Navfn:

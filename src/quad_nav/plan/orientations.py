@@ -7,6 +7,8 @@ import enum
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.parameter import Choice
+
 # A turn of more than this between two points ends the last straight part of a path.
 _STRAIGHT_RAD = 0.35
 
@@ -22,6 +24,20 @@ class OrientationMode(enum.IntEnum):
     LEFTWARD = 5
     RIGHTWARD = 6
 
+
+ORIENTATIONS = (
+    Choice("None", OrientationMode.NONE, "No heading but the goal's"),
+    Choice("Forward", OrientationMode.FORWARD, "Along the path"),
+    Choice("Interpolate", OrientationMode.INTERPOLATE, "From the start's to the goal's heading"),
+    Choice(
+        "ForwardThenInterpolate",
+        OrientationMode.FORWARD_THEN_INTERPOLATE,
+        "Along the path until the last straight part, which turns to the goal's heading",
+    ),
+    Choice("Backward", OrientationMode.BACKWARD, "Against the path"),
+    Choice("Leftward", OrientationMode.LEFTWARD, "The left side along the path"),
+    Choice("Rightward", OrientationMode.RIGHTWARD, "The right side along the path"),
+)
 
 # From the path's direction to the robot's heading.
 _TURNED_RAD = {

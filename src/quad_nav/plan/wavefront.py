@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.grid import LETHAL
-from quad_nav.kernels import wave as kernel
+from quad_nav.plan import wavefront_kernel as kernel
 
 NOT_REACHED = float(kernel.NOT_REACHED)  # potential of cells that the wave did not reach
 
@@ -57,7 +57,7 @@ class Wavefront:
         target: int,
         max_fronts: int,
     ) -> bool:
-        """Spread the potential that has begun at a source; see ``kernels.wave.propagate``.
+        """Spread the potential that has begun at a source; see ``plan.wavefront_kernel.propagate``.
 
         The wave never enters the outermost ring of cells.
 

@@ -1,4 +1,4 @@
-"""Read messages from recordings: ROS 1 bags, and MCAP with ROS 1 messages; their times."""
+"""Read messages and their times from recordings, which are ROS 1 bags."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import Any, Callable, Dict, Iterator, NamedTuple, Sequence, Tuple
 
 import numpy as np
-from mcap.exceptions import McapError
-from mcap.reader import make_reader
 from numpy.typing import NDArray
 from rosbags.rosbag1 import Reader, ReaderError
 
@@ -52,17 +50,16 @@ def read_messages(
     Raises:
         InputError: The file is not a recording, is damaged or was not completed.
     """
-    open_file(path).close()  # refuses pipes, on which the libraries would block
-    read = _read_mcap if path.suffix == ".mcap" else _read_bag
+    open_file(path).close()  # refuses pipes, on which rosbags would block
     with recording_faults(path):
-        for topic, kind, stamp_ns, data, share in read(path, wanted):
+        for topic, kind, stamp_ns, data, share in _read(path, wanted):
             progress(share)
             yield Message(topic, kind, stamp_ns, decode(data, kind))
 
 
 @contextmanager
 def recording_faults(path: Path) -> Iterator[None]:
-    """Say what is wrong with a recording whatever the libraries raise while they read it.
+    """Say what is wrong with a recording whatever rosbags raises while it reads it.
 
     Raises:
         InputError: The file is not a recording, is damaged or was not completed.
@@ -73,13 +70,12 @@ def recording_faults(path: Path) -> Iterator[None]:
         raise InputError(
             [f"{path}: cannot read: {error.strerror or error}; expected a recorded flight"]
         ) from error
-    except (ReaderError, McapError) as error:
+    except ReaderError as error:
         raise InputError([f"{path}: {_problem_text(error)}"]) from error
     except (MemoryError, InputError):
         raise
     except Exception as error:
-        # For damaged files the two libraries also raise errors of struct and lz4, AssertionError
-        # and others.
+        # For damaged files rosbags also raises errors of struct and lz4, AssertionError and others.
         raise InputError(
             [f"{path}: damaged file ({type(error).__name__}: {error}); expected a recorded flight"]
         ) from error
@@ -97,7 +93,7 @@ def _share(stamp_ns: int, start_ns: int, end_ns: int) -> float:
     return (stamp_ns - start_ns) / max(end_ns - start_ns, 1)
 
 
-def _read_bag(path: Path, wanted: TopicFilter) -> Iterator[_Raw]:
+def _read(path: Path, wanted: TopicFilter) -> Iterator[_Raw]:
     with Reader(path) as reader:
         kinds: Dict[int, str] = {}
         for connection in reader.connections:
@@ -111,34 +107,13 @@ def _read_bag(path: Path, wanted: TopicFilter) -> Iterator[_Raw]:
                 yield connection.topic, kinds[connection.id], stamp_ns, data, share
 
 
-def _read_mcap(path: Path, wanted: TopicFilter) -> Iterator[_Raw]:
-    with path.open("rb") as file:
-        reader = make_reader(file)
-        summary = reader.get_summary()
-        if summary is None:
-            raise McapError("no index, the recording was not completed")
-        topics = [
-            channel.topic
-            for channel in summary.channels.values()
-            if channel.message_encoding == "ros1"
-            and wanted(channel.topic, summary.schemas[channel.schema_id].name)
-        ]
-        statistics = summary.statistics
-        if topics and statistics is not None:
-            start_ns, end_ns = statistics.message_start_time, statistics.message_end_time
-            for schema, channel, message in reader.iter_messages(topics):
-                assert schema is not None
-                share = _share(message.log_time, start_ns, end_ns)
-                yield channel.topic, schema.name, message.log_time, message.data, share
-
-
 def _problem_text(error: Exception) -> str:
     text = str(error).rstrip(".")
     if "not indexed" in text:
         return "no index, the recording was not completed; run `rosbag reindex`"
     if "damaged" in text or "Header" in text:
         return f"truncated or damaged ({text}); expected a complete bag, run `rosbag reindex`"
-    return f"cannot read as a recording ({text}); expected a ROS 1 bag or MCAP"
+    return f"cannot read as a recording ({text}); expected a ROS 1 bag"
 
 
 class FlightClock:

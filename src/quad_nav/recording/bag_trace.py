@@ -29,6 +29,7 @@ from quad_nav.recording.bag_info import (
     checked_pose,
     require_finite,
 )
+from quad_nav.recording.bag_people import read_people
 from quad_nav.recording.bag_robot import BagRobot
 from quad_nav.recording.messages import pose_from, stamp_ns
 from quad_nav.recording.trace import FlightTrace
@@ -43,7 +44,6 @@ from quad_nav.topics.flight_info import (
     contact_from_values,
     from_text,
 )
-from quad_web.replay.recorded_obstacles import read_people
 
 MAX_MEMORY_BYTES = 4 * 10**9
 """Limit for reading a recording: unpacked, it may be a thousand times larger."""

@@ -32,7 +32,7 @@ class NavigatorTopics:
     def __init__(self, robot: int, hosted: LoopRobot, topics: TopicWriter) -> None:
         """Write the topics of robot number ``robot``."""
         navigator = hosted.navigator
-        self._tracker, self._tracks = hosted.tracker, TrackSchedule(hosted.tracker)
+        self._scan_filters, self._tracks = hosted.scan_filters, TrackSchedule()
         self.action = ActionTopics(robot, topics, navigator.global_costmap.params.global_frame)
         self._robot, self._topics = f"quad{robot}", topics
         self._navigator = navigator
@@ -89,9 +89,9 @@ class NavigatorTopics:
             self._write("right_of_way", stamp, status, latched=True)
 
     def _write_obstacles(self, now_s: float, stamp: int) -> None:
-        tracks = self._tracks.pop(now_s)
+        tracks = self._tracks.pop(now_s, self._scan_filters.tracks(now_s))
         if tracks is not None:
-            shown = track_markers(tracks, self._tracker.unseen_s, self._tracker.frame)
+            shown = track_markers(tracks, self._navigator.local_costmap.params.global_frame)
             self._write(MARKERS_TOPIC, stamp, messages.marker_array(shown, replaces_all=True))
 
     def _write_plans(self, tick: Tick, stamp: int) -> None:

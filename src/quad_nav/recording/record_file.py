@@ -1,6 +1,6 @@
-"""Write ROS messages to files: ROS 1 bags, or MCAP with the same bytes.
+"""Write ROS messages to ROS 1 bags.
 
-A file is written as ``<name>.active``, as ``rosbag record`` does, and renamed when it is
+A bag is written as ``<name>.active``, as ``rosbag record`` does, and renamed when it is
 complete. Until then an older recording of that name stays in place.
 """
 
@@ -9,53 +9,28 @@ from __future__ import annotations
 import contextlib
 import os
 from pathlib import Path
-from typing import Any, Dict, Optional, Protocol
+from typing import Any, Dict, Optional
 
 import lz4.frame
-from mcap.writer import CompressionType
-from mcap.writer import Writer as McapLibraryWriter
-from rosbags.rosbag1 import Writer as BagLibraryWriter
+from rosbags.rosbag1 import Writer
 
 from quad_nav.errors import InputError
 from quad_nav.files.output import make_folder
 from quad_nav.recording.messages import definition, encode, long_name
 from quad_nav.scenario.rules import START_S
 
-SUFFIXES = (".bag", ".mcap")
+SUFFIX = ".bag"
 
 
-class RecordFile(Protocol):
-    """File that takes messages in the order of their stamps.
-
-    All methods raise ``OSError`` if the file cannot be written.
-    """
-
-    def add_topic(self, topic: str, kind: str, latched: bool, node: str) -> Any:
-        """Return a topic's handle for ``write``; ``kind`` is a type such as ``nav_msgs/Path``."""
-
-    def write(self, handle: Any, stamp_ns: int, data: bytes) -> None:
-        """Append one serialized message."""
-
-    def close(self) -> None:
-        """Complete the file.
-
-        Raises:
-            OSError: Part of the recording is lost. The rest is readable.
-        """
-
-
-def create(path: Path) -> RecordFile:
-    """Create a recording, in the format of the name's suffix.
+def create(path: Path) -> BagWriter:
+    """Create a recording.
 
     Raises:
-        InputError: The suffix is unknown, or the file cannot be created.
+        InputError: The name has another suffix, or the file cannot be created.
     """
-    if path.suffix not in SUFFIXES:
+    if path.suffix != SUFFIX:
         raise InputError(
-            [
-                f"{path}: unknown recording format; expected a name that ends with "
-                f"{' or '.join(SUFFIXES)}"
-            ]
+            [f"{path}: unknown recording format; expected a name that ends with {SUFFIX}"]
         )
     active = path.with_name(path.name + ".active")
     try:
@@ -64,7 +39,7 @@ def create(path: Path) -> RecordFile:
         make_folder(path.parent)
         with contextlib.suppress(FileNotFoundError):
             active.unlink()
-        return BagWriter(path, active) if path.suffix == ".bag" else McapWriter(path, active)
+        return BagWriter(path, active)
     except OSError as error:
         raise InputError(
             [f"{path}: cannot write the recording: {error.strerror}; expected a writable file"]
@@ -72,18 +47,22 @@ def create(path: Path) -> RecordFile:
 
 
 class BagWriter:
-    """ROS 1 bag in LZ4 chunks of 1 MiB."""
+    """ROS 1 bag in LZ4 chunks of 1 MiB; takes messages in the order of their stamps."""
 
     def __init__(self, path: Path, active: Path) -> None:
         self._path, self._active = path, active
-        self._writer = BagLibraryWriter(active)
-        self._writer.set_compression(BagLibraryWriter.CompressionFormat.LZ4)
+        self._writer = Writer(active)
+        self._writer.set_compression(Writer.CompressionFormat.LZ4)
         self._writer.compressor = _compressed
         self._error: Optional[OSError] = None
         self._writer.open()
 
     def add_topic(self, topic: str, kind: str, latched: bool, node: str) -> Any:
-        """Add a connection; see ``RecordFile``."""
+        """Return a topic's handle for ``write``; ``kind`` is a type such as ``nav_msgs/Path``.
+
+        Raises:
+            OSError: The file cannot be written.
+        """
         text, digest = definition(kind)
         return self._writer.add_connection(
             topic, long_name(kind), msgdef=text, md5sum=digest, callerid=node, latching=int(latched)
@@ -147,55 +126,6 @@ def _compressed(data: bytes) -> bytes:
     return packed
 
 
-class McapWriter:
-    """MCAP file with ROS 1 messages; the format cannot mark latched topics."""
-
-    def __init__(self, path: Path, active: Path) -> None:
-        self._path, self._active = path, active
-        self._file = active.open("wb")
-        self._writer: Any = McapLibraryWriter(self._file, compression=CompressionType.LZ4)
-        self._writer.start("ros1")
-        self._schemas: Dict[str, int] = {}
-
-    def add_topic(self, topic: str, kind: str, latched: bool, node: str) -> Any:
-        """Add a channel; see ``RecordFile``."""
-        if kind not in self._schemas:
-            text, _ = definition(kind)
-            self._schemas[kind] = self._writer.register_schema(kind, "ros1msg", text.encode())
-        metadata = {"callerid": node, "latching": str(int(latched))}
-        return self._writer.register_channel(topic, "ros1", self._schemas[kind], metadata)
-
-    def write(self, handle: Any, stamp_ns: int, data: bytes) -> None:
-        """Append one serialized message.
-
-        Raises:
-            OSError: The file cannot be written; ``<name>.active`` keeps what fits.
-        """
-        try:
-            self._writer.add_message(handle, stamp_ns, data, stamp_ns)
-        except OSError as error:
-            raise self._lost(error) from error
-
-    def close(self) -> None:
-        """Complete the file.
-
-        Raises:
-            OSError: It has no index; ``<name>.active`` keeps what fits.
-        """
-        try:
-            self._writer.finish()
-            self._file.close()
-        except OSError as error:
-            with contextlib.suppress(OSError):
-                self._file.close()  # its buffer does not fit on the disk
-            raise self._lost(error) from error
-        os.replace(self._active, self._path)
-
-    def _lost(self, error: OSError) -> OSError:
-        kept = f"{self._active.name} keeps what fits, `mcap recover` completes it"
-        return OSError(error.errno, f"{error.strerror}; {kept}")
-
-
 START_NS = round(START_S * 1e9)
 
 
@@ -210,7 +140,7 @@ class TopicWriter:
     After a write error it drops all further messages, and ``problem`` holds the reason.
     """
 
-    def __init__(self, file: RecordFile) -> None:
+    def __init__(self, file: BagWriter) -> None:
         self._file = file
         self._handles: Dict[str, Any] = {}
         self.problem = ""

@@ -40,7 +40,7 @@ _SIMULATOR, _SEQUENCER = "/simulator", "/sequencer"
 
 
 class Recorder(FlightObserver):
-    """Writes a flight to a ``.bag`` or ``.mcap`` file.
+    """Writes a flight to a bag.
 
     If the file cannot be written, the flight stops; messages recorded until then stay readable.
 

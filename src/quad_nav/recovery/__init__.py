@@ -11,7 +11,7 @@ from __future__ import annotations
 from quad_nav.recovery.clear_costmap import ClearCostmap, ClearCostmapParams
 from quad_nav.recovery.move_slow import MoveSlowAndClear, MoveSlowAndClearParams
 from quad_nav.recovery.recovery import ParameterLimit, Recovery, RecoveryContext, Step
-from quad_nav.recovery.rotate import FootprintCost, Rotate, RotateParams
+from quad_nav.recovery.rotate import FootprintCost, Rotate, RotateParams, TurnLimits
 
 __all__ = [
     "ClearCostmap",
@@ -25,4 +25,5 @@ __all__ = [
     "Rotate",
     "RotateParams",
     "Step",
+    "TurnLimits",
 ]

@@ -7,6 +7,7 @@ from typing import Iterable, Optional, Tuple
 
 from quad_nav.costmap.layer import Redraw
 from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.parameter import deviation, fixed_flag, fixed_number, fixed_text
 from quad_nav.recovery.recovery import RecoveryContext, Step
 
 # The layers that upstream clears by default. No layer has this name there either: the
@@ -26,13 +27,21 @@ class ClearCostmapParams:
             restores upstream behaviour.
     """
 
-    reset_distance_m: float = 3.0
+    reset_distance_m: float = fixed_number(
+        "reset_distance", 3.0, "metres", "Side of the square outside of which costs are cleared."
+    )
+    invert_area_to_clear: bool = fixed_flag(
+        "invert_area_to_clear", False, "Clear the inside of the square instead."
+    )
+    force_updating: bool = fixed_flag(
+        "force_updating", False, "Update the costmaps after clearing."
+    )
+    affected_maps: str = fixed_text(
+        "affected_maps", "both", "local, global or both", "Which costmaps are cleared."
+    )
     layer_names: Optional[Tuple[str, ...]] = None
-    invert_area_to_clear: bool = False
-    force_updating: bool = False
-    affected_maps: str = "both"  # "global", "local" or "both"
-    clear_any_obstacle_layer: bool = True
-    redraw_cleared_costmaps: bool = True
+    clear_any_obstacle_layer: bool = deviation()
+    redraw_cleared_costmaps: bool = deviation()
 
 
 class ClearCostmap:

@@ -11,6 +11,7 @@ from typing import List, Tuple
 
 from quad_nav.costmap.layer import Redraw
 from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.parameter import POSITIVE, deviation, fixed_number, fixed_text
 from quad_nav.recovery.recovery import ParameterLimit, RecoveryContext, Step
 
 # Upstream clears the layers whose names have this word in them.
@@ -36,17 +37,34 @@ class MoveSlowAndClearParams:
             behaviour, which sets two named parameters, even to more than they are.
     """
 
-    clearing_distance_m: float = 0.5
-    limited_trans_speed_mps: float = 0.25
-    limited_rot_speed_radps: float = 0.45
-    limited_distance_m: float = 0.3
+    clearing_distance_m: float = fixed_number(
+        "clearing_distance", 0.5, "metres", "Distance within which obstacles are cleared."
+    )
+    limited_trans_speed_mps: float = fixed_number(
+        "limited_trans_speed", 0.25, "m/s", "Largest speed after clearing.", POSITIVE
+    )
+    limited_rot_speed_radps: float = fixed_number(
+        "limited_rot_speed", 0.45, "rad/s", "Largest rotational speed after clearing.", POSITIVE
+    )
+    limited_distance_m: float = fixed_number(
+        "limited_distance", 0.3, "metres", "The limits end when the robot has moved this far."
+    )
+    planner_namespace: str = fixed_text(
+        "planner_namespace", "", "a planner's namespace", "Planner whose speeds upstream sets."
+    )
+    max_trans_param_name: str = fixed_text(
+        "max_trans_param_name", "", "a parameter's name", "Another speed that is limited."
+    )
+    max_rot_param_name: str = fixed_text(
+        "max_rot_param_name", "", "a parameter's name", "Another rotational speed that is limited."
+    )
     translation_fields: Tuple[str, ...] = ()
     rotation_fields: Tuple[str, ...] = ()
     named_translation_field: str = ""
     named_rotation_field: str = ""
-    clear_any_obstacle_layer: bool = True
-    redraw_cleared_costmaps: bool = True
-    limit_all_speeds: bool = True
+    clear_any_obstacle_layer: bool = deviation()
+    redraw_cleared_costmaps: bool = deviation()
+    limit_all_speeds: bool = deviation()
 
     @property
     def limit(self) -> ParameterLimit:

@@ -10,7 +10,26 @@ import numpy as np
 
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
+from quad_nav.parameter import POSITIVE, deviation, fixed_number
 from quad_nav.recovery.recovery import RecoveryContext, Step
+
+
+@dataclass(frozen=True)
+class TurnLimits:
+    """Parameters that RotateRecovery reads from TrajectoryPlannerROS, with its own defaults."""
+
+    yaw_goal_tolerance_rad: float = fixed_number(
+        "yaw_goal_tolerance", 0.10, "radians", "Tolerance of the heading after the turn."
+    )
+    acc_lim_theta_radps2: float = fixed_number(
+        "acc_lim_theta", 3.2, "rad/s^2", "Rotational acceleration limit."
+    )
+    max_vel_theta_radps: float = fixed_number(
+        "max_vel_theta", 1.0, "rad/s", "Largest rotational velocity."
+    )
+    min_in_place_vel_theta_radps: float = fixed_number(
+        "min_in_place_vel_theta", 0.4, "rad/s", "Smallest speed of a turn in place."
+    )
 
 
 @dataclass(frozen=True)
@@ -18,17 +37,15 @@ class RotateParams:
     """Parameters of ``rotate_recovery/RotateRecovery``.
 
     Attributes:
-        sim_granularity_rad: Step of the collision check along the turn.
         stop_after_rotation: Publish a stop after the turn; False restores upstream behaviour.
     """
 
-    frequency_hz: float = 20.0
-    sim_granularity_rad: float = 0.017
-    yaw_goal_tolerance_rad: float = 0.10
-    acc_lim_theta_radps2: float = 3.2
-    max_vel_theta_radps: float = 1.0
-    min_in_place_vel_theta_radps: float = 0.4
-    stop_after_rotation: bool = True
+    frequency_hz: float = fixed_number("frequency", 20.0, "Hz", "Rate of commands.", POSITIVE)
+    sim_granularity_rad: float = fixed_number(
+        "sim_granularity", 0.017, "radians", "Step of the turn's collision check.", POSITIVE
+    )
+    limits: TurnLimits = TurnLimits()
+    stop_after_rotation: bool = deviation()
 
 
 FootprintCost = Callable[[LayeredCostmap, Pose2D], float]
@@ -79,7 +96,7 @@ class Rotate:
     def _remaining_angle(self, yaw_rad: float) -> Optional[float]:
         """Return the remaining angle, None if the turn is complete."""
         assert self._start_yaw_rad is not None
-        tolerance = self.params.yaw_goal_tolerance_rad
+        tolerance = self.params.limits.yaw_goal_tolerance_rad
         to_half_turn = abs(angle_difference(self._start_yaw_rad + math.pi, yaw_rad))
         if not self._past_half_turn:
             self._past_half_turn = to_half_turn < tolerance
@@ -94,6 +111,6 @@ class Rotate:
         )
 
     def _speed(self, remaining_rad: float) -> float:
-        params = self.params
-        speed = math.sqrt(2.0 * params.acc_lim_theta_radps2 * remaining_rad)
-        return min(max(speed, params.min_in_place_vel_theta_radps), params.max_vel_theta_radps)
+        limits = self.params.limits
+        speed = math.sqrt(2.0 * limits.acc_lim_theta_radps2 * remaining_rad)
+        return min(max(speed, limits.min_in_place_vel_theta_radps), limits.max_vel_theta_radps)

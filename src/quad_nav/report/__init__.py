@@ -1,10 +1,12 @@
 """Reports of flights: from a ``FlightTrace`` to HTML, PNG, GIF and MP4.
 
 Reading order: ``measures`` and ``flight_metrics`` (what is computed from a trace),
-``encounters`` (close encounters and contacts), the modules that end in ``_picture`` (one
-picture each, drawn with matplotlib), ``page`` (the HTML around them), ``animation``.
+``encounters`` (close encounters and contacts), ``paths``, ``distances`` and ``timeline`` (what the
+figures show), ``plotly_figures`` (draws them in pages) and ``matplotlib_figures`` (on paper), the
+modules that end in ``_picture`` (drawn with matplotlib alone), ``page`` (the HTML around them),
+``animation``.
 
-Only this package and ``tuning.report`` import matplotlib and jinja2. Commands that fly import
+Only this package and reports of add-ons import matplotlib and jinja2. Commands that fly import
 them only if a report is requested, because that takes longer than starting a flight.
 """
 

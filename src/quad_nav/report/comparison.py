@@ -13,10 +13,12 @@ from quad_nav.report.compared_flight import (
     labelled,
     variants,
 )
-from quad_nav.report.comparison_picture import comparison_picture, grouped, overlay_picture
-from quad_nav.report.comparison_plot import MOST_OVERLAID, overlay_plot
 from quad_nav.report.flight_metrics import FlightMetrics
+from quad_nav.report.matplotlib_figures import paths_picture
+from quad_nav.report.metrics_picture import grouped, metrics_picture
 from quad_nav.report.page import Page, Section, picture, render, write_page
+from quad_nav.report.paths import MOST_OVERLAID, overlaid_paths
+from quad_nav.report.plotly_figures import paths_plot
 
 _MOST_NUMBERS = 6  # in the head of a column
 
@@ -126,13 +128,13 @@ def _paths(flights: Sequence[ComparedFlight], metrics: Sequence[FlightMetrics]) 
     )
     if len(flights) > MOST_OVERLAID:
         caption += f" The first {MOST_OVERLAID} flights of {len(flights)} are shown."
-    shown = flights[:MOST_OVERLAID]
+    content = overlaid_paths(flights[:MOST_OVERLAID], metrics)
     return Section(
         "paths",
         "Paths",
         caption,
-        plots=(overlay_plot(shown, metrics),),
-        paper=(picture("paths", "Paths of all flights", lambda: overlay_picture(shown, metrics)),),
+        plots=(paths_plot(content),),
+        paper=(picture("paths", "Paths of all flights", lambda: paths_picture(content)),),
     )
 
 
@@ -141,7 +143,7 @@ def _dots(metrics: Sequence[FlightMetrics]) -> Section:
         "comparison",
         "Side by side",
         "A dot is a flight. Boxes span the middle half of five or more flights, with the median.",
-        (picture("comparison", "Metrics of each flight", lambda: comparison_picture(metrics)),),
+        (picture("comparison", "Metrics of each flight", lambda: metrics_picture(metrics)),),
     )
 
 

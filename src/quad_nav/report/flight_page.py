@@ -9,18 +9,17 @@ from typing import List, Optional, Sequence
 from quad_nav.config.difference_table import parameter_rows
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report import style
-from quad_nav.report.distance_picture import distance_picture
-from quad_nav.report.distance_plot import distance_plot
+from quad_nav.report.distances import distance_panels, speed_panel
 from quad_nav.report.encounter_picture import encounter_picture
 from quad_nav.report.encounters import CLOSE_M, LETTERS, Encounter, encounters, separation_text
 from quad_nav.report.flight_metrics import FlightMetrics, flight_metrics
+from quad_nav.report.matplotlib_figures import distance_picture, paths_picture, timeline_picture
 from quad_nav.report.measures import Tracks, resampled_tracks
 from quad_nav.report.page import MAX_STRIPS, Page, Section, picture, render, write_page
-from quad_nav.report.paths_picture import paths_picture
-from quad_nav.report.paths_plot import paths_plot
+from quad_nav.report.paths import flown_paths
+from quad_nav.report.plotly_figures import distance_plot, paths_plot, timeline_plot
 from quad_nav.report.robot_picture import cycle_picture, has_wall_times, motion_picture
-from quad_nav.report.timeline_picture import timeline_picture
-from quad_nav.report.timeline_plot import timeline_plot
+from quad_nav.report.timeline import timeline
 
 
 def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page:
@@ -51,6 +50,7 @@ def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page
 
 
 def _paths(trace: FlightTrace, tracks: Tracks, shown: Sequence[Encounter]) -> Section:
+    content = flown_paths(trace, tracks, shown)
     obstacles = " and what moves by itself" if trace.movers is not None else ""
     return Section(
         "paths",
@@ -59,10 +59,8 @@ def _paths(trace: FlightTrace, tracks: Tracks, shown: Sequence[Encounter]) -> Se
         f"quadcopters{obstacles}, at the end or at the time of the slider. Drag to zoom, "
         "double-click to zoom out. A click in the legend hides a quadcopter, a double click all "
         "others. Check whether paths keep to the middle of gaps, and whether they circle.",
-        plots=(paths_plot(trace, tracks, shown),),
-        paper=(
-            picture("paths", "Paths over the scene", lambda: paths_picture(trace, tracks, shown)),
-        ),
+        plots=(paths_plot(content),),
+        paper=(picture("paths", "Paths over the scene", lambda: paths_picture(content)),),
     )
 
 
@@ -107,14 +105,15 @@ def _note(encounter: Encounter) -> str:
 def _curves(
     trace: FlightTrace, tracks: Tracks, flight: FlightMetrics, shown: Sequence[Encounter]
 ) -> List[Section]:
+    goals = timeline(trace)
     return [
         _distances(trace, tracks, shown),
         Section(
             "timeline",
             "Timeline",
             "A bar is a goal with its number, from sending it to its end.",
-            plots=(timeline_plot(trace),),
-            paper=(picture("timeline", "Goals over time", lambda: timeline_picture(trace)),),
+            plots=(timeline_plot(goals),),
+            paper=(picture("timeline", "Goals over time", lambda: timeline_picture(goals)),),
         ),
         _motion(trace, flight),
         _cycles(trace),
@@ -122,18 +121,21 @@ def _curves(
 
 
 def _distances(trace: FlightTrace, tracks: Tracks, shown: Sequence[Encounter]) -> Section:
+    panels = distance_panels(trace, tracks, shown)
+    names = [robot.name for robot in trace.robots]
+    contacts_s = [contact.time_s for contact in trace.contacts]
     return Section(
         "gaps",
         "Distances and speeds",
         "Separation is the distance between the hulls of two robots, clearance the distance from "
         f"a hull to the nearest obstacle or wall. Hulls are discs of {trace.robot_radius_m:.2f} m "
         "radius; below zero they overlap. Letters are close encounters, dashed lines contacts.",
-        plots=(distance_plot(trace, tracks, shown),),
+        plots=(distance_plot([*panels, speed_panel(trace)], names, contacts_s),),
         paper=(
             picture(
                 "distances",
                 "Separation and clearance over time",
-                lambda: distance_picture(trace, tracks, shown),
+                lambda: distance_picture(panels, names, contacts_s),
             ),
         ),
     )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.measures import Tracks
-from quad_nav.report.plot import Json, numbers, rgb, robot_marks
+from quad_nav.report.plot import Json, numbers, rgb, symbol_scale
 from quad_nav.report.scene_drawing import CIRCLE_CORNERS, MOVING, outline
 
 _MOST_FRAMES = 200
@@ -80,14 +80,24 @@ def _obstacle_trace(frames: Sequence[Json]) -> List[Json]:
 
 def _robot_traces(tracks: Tracks, flown: Sequence[int]) -> List[Json]:
     """Return the traces of the robots at the end."""
+    size = round(28 * symbol_scale(len(flown)), 1)
     return [
         {
-            **robot_marks(
-                k, tracks.positions_m[k, -1:], [f"<b>{k}</b>"], "circle", 28, len(flown), 0.25
-            ),
-            "legendgroup": f"robot{k}",
+            "type": "scatter",
+            "mode": "markers+text",
+            "x": numbers(tracks.positions_m[k, -1:, 0]),
+            "y": numbers(tracks.positions_m[k, -1:, 1]),
+            "text": [f"<b>{k}</b>"],
             "textposition": "top center",
             "textfont": {"size": 13, "color": rgb(k)},
+            "marker": {
+                "symbol": "circle",
+                "size": size,
+                "color": rgb(k, 0.25),
+                "line": {"color": rgb(k), "width": 2},
+            },
+            "legendgroup": f"robot{k}",
+            "showlegend": False,
             "hoverinfo": "skip",
         }
         for k in flown

@@ -223,39 +223,6 @@ _DRAW = """
 """
 
 
-def robot_marks(
-    number: int,
-    places_m: NDArray[np.float64],
-    texts: Sequence[str],
-    symbol: str,
-    size: float,
-    count: int,
-    alpha: float = 1.0,
-) -> Json:
-    """Return a trace of marks in a robot's colour, each with a text.
-
-    Args:
-        number: Number of the robot.
-        places_m: float64[k, 2].
-        texts: Texts in the marks.
-        symbol: Symbol of plotly.js.
-        size: Size of the symbols, pixels; with many robots they are smaller.
-        count: Number of robots in the plot.
-        alpha: Opacity of the fill.
-    """
-    scale = min(1.0, (_FULL_SIZE_UP_TO / count) ** 0.25)
-    return {
-        "type": "scatter",
-        "mode": "markers+text",
-        "x": numbers(places_m[:, 0]),
-        "y": numbers(places_m[:, 1]),
-        "text": list(texts),
-        "textfont": {"size": round(10 * scale**0.7, 1), "color": "#fff"},
-        "marker": {
-            "symbol": symbol,
-            "size": round(size * scale, 1),
-            "color": rgb(number, alpha),
-            "line": {"color": rgb(number), "width": 2},
-        },
-        "showlegend": False,
-    }
+def symbol_scale(robots: int) -> float:
+    """Return the size of the symbols of many robots, in parts of that of a few."""
+    return float(min(1.0, (_FULL_SIZE_UP_TO / robots) ** 0.25))

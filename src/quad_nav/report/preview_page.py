@@ -18,28 +18,8 @@ from quad_nav.sim.colours import robot_rgba
 _DIGITS = 3  # of coordinates in metres
 
 
-def robot_data(robot: RobotPreview) -> Dict[str, Any]:
-    """Return what the page's script draws of one robot, ready for JSON."""
-    start = robot.start
-    return {
-        "number": robot.number,
-        "name": robot.name,
-        "color": _css(robot.number),
-        "start": [start.x_m, start.y_m, start.yaw_rad] if start else None,
-        "goals": [
-            {"source": index, "x": goal.x_m, "y": goal.y_m, "yaw": goal.yaw_rad, "fault": fault}
-            for index, (goal, fault) in enumerate(zip(robot.sequence.goals, robot.faults))
-        ],
-        "plans": [np.round(plan, _DIGITS).tolist() for plan in robot.plans],
-        "warnings": list(robot.warnings),
-    }
-
-
 def page_data(
-    preview: MissionPreview,
-    robots: Sequence[RobotPreview],
-    title: str,
-    editable: Mapping[int, str] = {},
+    preview: MissionPreview, robots: Sequence[RobotPreview], title: str
 ) -> Dict[str, Any]:
     """Return everything that the page's script draws, ready for JSON.
 
@@ -47,7 +27,6 @@ def page_data(
         preview: The mission.
         robots: Its robots with goals.
         title: Heading of the page.
-        editable: Versions of the goal files that may be edited, by the robots' numbers.
     """
     scene = preview.scene
     solids, passed = outlines(scene) if scene else ([], [])
@@ -62,33 +41,43 @@ def page_data(
         "motions": _lines(keyframe_paths(scene) if scene else []),
         "movingColor": MOVING,
         "robots": [
-            {
-                **robot_data(robot),
-                "file": str(preview.files.get(robot.number, "")),
-                "version": editable.get(robot.number, ""),
-            }
+            {**_robot_data(robot), "file": str(preview.files.get(robot.number, ""))}
             for robot in robots
         ],
         "problems": list(preview.problems),
         "warnings": list(preview.warnings),
-        "editable": bool(editable),
     }
 
 
-def preview_page(data: Mapping[str, Any], nonce: str = "") -> str:
+def preview_page(data: Mapping[str, Any]) -> str:
     """Render the page.
 
     Args:
         data: Result of ``page_data``.
-        nonce: Number of the page's script in the Content-Security-Policy of the server that
-            serves the page; "" for a page in a file.
     """
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader([Path(__file__).parent]),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
     )
-    return environment.get_template("preview.html.jinja").render(data=data, nonce=nonce)
+    return environment.get_template("preview.html.jinja").render(data=data)
+
+
+def _robot_data(robot: RobotPreview) -> Dict[str, Any]:
+    """Return what the page's script draws of one robot, ready for JSON."""
+    start = robot.start
+    return {
+        "number": robot.number,
+        "name": robot.name,
+        "color": _css(robot.number),
+        "start": [start.x_m, start.y_m, start.yaw_rad] if start else None,
+        "goals": [
+            {"x": goal.x_m, "y": goal.y_m, "yaw": goal.yaw_rad, "fault": fault}
+            for goal, fault in zip(robot.sequence.goals, robot.faults)
+        ],
+        "plans": [np.round(plan, _DIGITS).tolist() for plan in robot.plans],
+        "warnings": list(robot.warnings),
+    }
 
 
 def _lines(lines: Sequence[NDArray[np.float64]]) -> List[Any]:

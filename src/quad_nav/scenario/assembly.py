@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.config import Configuration
+from quad_nav.config.filters import FilterType
 from quad_nav.config.plugins import Plugin
 from quad_nav.config.recoveries import RecoveryParams
 from quad_nav.control.controller import LocalPlanner
@@ -20,8 +21,11 @@ from quad_nav.costmap.layer import LayerParams
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.peer_layer import PeerLayerParams
+from quad_nav.costmap.scan_filter import ScanFilter, ScanFilters
 from quad_nav.costmap.scan_intake import ScanIntake
+from quad_nav.costmap.scan_validator import ScanValidator
 from quad_nav.geometry import Pose2D
+from quad_nav.navigator.command_filter import CommandFilter, VoronoiCell
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
 from quad_nav.peers.coordinator import PeerCoordinator
@@ -37,7 +41,6 @@ from quad_nav.recovery import (
     Recovery,
     Rotate,
 )
-from quad_nav.tracking.tracker import ObstacleTracker
 
 # The planner that each dataclass of parameters is for; both take the footprint, float64[n, 2].
 GLOBAL_PLANNERS: Dict[type, Callable[[Any, NDArray[np.float64]], GlobalPlanner]] = {
@@ -79,13 +82,35 @@ def build_navigator(configuration: Configuration, number: Optional[int] = None) 
             local_costmap,
             configuration.robot if number is None else number,
         ),
+        [_command_filter(kind) for _, kind in configuration.command_filters],
     )
+
+
+def build_scan_filters(configuration: Configuration) -> ScanFilters:
+    """Build the scan filters of one robot, for all of its sensors."""
+    return ScanFilters(
+        [_scan_filter(kind, configuration) for _, kind in configuration.scan_filters]
+    )
+
+
+def _scan_filter(kind: FilterType, configuration: Configuration) -> ScanFilter:
+    if isinstance(kind, Plugin):
+        made: ScanFilter = kind.make()
+        return made
+    return ScanValidator(configuration.scan_validator)
+
+
+def _command_filter(kind: FilterType) -> CommandFilter:
+    if isinstance(kind, Plugin):
+        made: CommandFilter = kind.make()
+        return made
+    return VoronoiCell()
 
 
 def reconfigure_robot(
     configuration: Configuration,
     navigator: Navigator,
-    tracker: ObstacleTracker,
+    filters: ScanFilters,
     intakes: Iterable[ScanIntake],
 ) -> None:
     """Change every parameter of a robot that may change in flight; plan and goal stay.
@@ -93,13 +118,15 @@ def reconfigure_robot(
     Args:
         configuration: The configuration from now on.
         navigator: The robot's navigator.
-        tracker: Its tracker of moving obstacles.
+        filters: Its scan filters.
         intakes: Those of all of its sensors.
     """
     apply_configuration(navigator, configuration)
-    tracker.params = configuration.tracker
+    for scan_filter in filters.filters:
+        if isinstance(scan_filter, ScanValidator):
+            scan_filter.params = configuration.scan_validator
     for intake in intakes:
-        intake.reconfigure(configuration.scan_validator)
+        intake.reconfigure()
 
 
 def apply_configuration(navigator: Navigator, configuration: Configuration) -> None:

@@ -13,8 +13,9 @@ from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.config.files import ParameterTree, set_value
 from quad_nav.config.robot_tree import is_users
-from quad_nav.config.tables.costmap import COSTMAP_TABLE
+from quad_nav.costmap.map_params import MapParams
 from quad_nav.files.values import MAX_MEMORY_BYTES, is_number
+from quad_nav.parameter import parameters_of
 from quad_nav.sim.scene import Scene
 
 Bounds = Tuple[float, float, float, float]
@@ -25,6 +26,7 @@ SIZE_FROM_SCENE = "size_from_scene"
 """Parameter of a navigator whose global costmap has the size of the scene."""
 BYTES_PER_CELL = 64
 """At least the memory that a cell of any costmap takes; ``config.workload`` computes it exactly."""
+_DEFAULTS = {parameter.name: parameter.default for parameter in parameters_of(MapParams)}
 _AXES = (("width", "origin_x"), ("height", "origin_y"))
 
 
@@ -63,7 +65,7 @@ def cover_area(
     """
     given = tree.get(COSTMAP)
     costmap: Mapping[str, Any] = given if isinstance(given, dict) else {}
-    values = {key: costmap.get(key, COSTMAP_TABLE[key].default) for key in _keys()}
+    values = {key: costmap.get(key, _DEFAULTS[key]) for key in _keys()}
     if _has_no_fixed_size(costmap) or not all(map(is_number, values.values())):
         return  # faulty values are reported when the tree is loaded
     if not is_feasible(area[2] - area[0], area[3] - area[1], values["resolution"]):

@@ -15,7 +15,6 @@ from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
 from quad_nav.files.values import value_faults
 from quad_nav.mission.robot_goals import RobotGoals
-from quad_nav.peers.links import LinkOutages
 from quad_nav.scenario.coverage import scene_bounds
 from quad_nav.scenario.rules import RANDOM, RULES, steps_per_scan
 from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configurations, read_scenario
@@ -66,8 +65,7 @@ class FlightSetup:
     """A flight that can be flown.
 
     ``simulation`` has the navigators' control period. ``config_name`` is the folder's name
-    without its path, which recordings and reports do not disclose. ``links`` are the outages of the
-    links over which robots hear each other.
+    without its path, which recordings and reports do not disclose.
     """
 
     scene: Scene
@@ -79,7 +77,6 @@ class FlightSetup:
     seed: int = 0
     time_limit_s: float = math.inf
     warnings: Tuple[str, ...] = ()
-    links: LinkOutages = LinkOutages()
 
     @property
     def robot_radius_m(self) -> float:

@@ -1,40 +1,28 @@
 """Compile the kernels before anything flies.
 
 numba compiles a kernel at its first call, which takes seconds, and caches the result beside the
-source, or in the user's cache if that folder is not writable. ``python -m
-quad_nav.scenario.warm_up`` fills the cache at installation and builds the library of compiled
-kernels, with which no process needs numba. A node warms up its own configuration before it accepts
-goals, which is quick with either.
+sources, or in the user's cache if that folder is not writable. ``python -m
+quad_nav.scenario.warm_up`` fills the cache at installation. A node warms up its own configuration
+before it accepts goals, which is quick with a full cache.
 """
 
 from __future__ import annotations
 
 import math
-import os
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Dict, Tuple
 
 import numpy as np
 
 from quad_nav import config
-from quad_nav.control.evasion import evade
-from quad_nav.control.surroundings import EvasionParams, Surroundings
 from quad_nav.control.trajectory_planner import TrajectoryPlanner
 from quad_nav.costmap.obstacle import ObstacleLayer
-from quad_nav.costmap.scan_validator import ScanValidator
-from quad_nav.errors import printable
+from quad_nav.costmap.scan_filter import ScanFilters, ScanSituation
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
-from quad_nav.grid import GridSpec
-from quad_nav.kernels import jit, library
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import RobotPoses
 from quad_nav.peers.peer import HIGHEST_PRIORITY, Intention, Peer
-from quad_nav.scenario.assembly import build_navigator
-from quad_nav.tracking.tracker import ObstacleTracker
-from quad_nav.tracking.tracks import TrackerParams, Tracks
+from quad_nav.scenario.assembly import build_navigator, build_scan_filters
 
 _AHEAD_M = 1.0
 _LIDAR: Dict[str, Any] = {
@@ -75,41 +63,29 @@ def warm_up(configuration: config.Configuration) -> None:
         spec.origin_x_m + 0.5 * spec.size_x * spec.resolution_m,
         spec.origin_y_m + 0.5 * spec.size_y * spec.resolution_m,
     )
+    filters = build_scan_filters(configuration)
     _add_scans(navigator, here)
+    _filter_scans(filters, here)
     navigator.set_goal(Pose2D(here.x_m + _AHEAD_M, here.y_m), 0.0)
     for now_s in (0.0, 0.5):
         navigator.tick(now_s, RobotPoses(here, here), Twist2D(vx_mps=0.1))
-    navigator.tick(1.0, RobotPoses(here, here), Twist2D(vx_mps=0.1), [_oncoming_peer(here, 1.0)])
+    peers, tracks = [_oncoming_peer(here, 1.0)], filters.tracks(1.0)
+    navigator.tick(1.0, RobotPoses(here, here), Twist2D(vx_mps=0.1), peers, tracks)
     _add_scans(navigator, here)  # again, with the points of a peer to remove
     if isinstance(navigator.controller, TrajectoryPlanner) and navigator.controller.rollout:
         navigator.controller.rollout.score(np.zeros((1, 3)))  # of strafing, the last resort
-    if configuration.tracker.track_moving_obstacles:
-        track_obstacle()
-        evade_obstacle()
 
 
-def track_obstacle() -> None:
-    """Track an obstacle that crosses free space, so that every kernel is called."""
-    params = TrackerParams(track_moving_obstacles=True, max_acceleration_mps2=6.0)
-    tracker = ObstacleTracker(params, "map")
-    lidar = Pose3D(0.0, 0.0, 1.0)
+def _filter_scans(filters: ScanFilters, here: Pose2D) -> None:
+    """Show the filters an obstacle that crosses free space, so that they call every kernel."""
+    lidar = Pose3D(here.x_m, here.y_m, 1.0)
     for step in range(12):
+        now_s, heights_m = 0.0833 * step, (-math.inf, math.inf)
         ranges = np.full(256, 6.0, np.float32)
         ranges[100 + 4 * step : 112 + 4 * step] = 3.0
-        scan = Scan(0.1 * step, -math.pi, 2 * math.pi / 256, 0.02, 60.0, ranges)
-        tracker.add_scan("scan", scan, lidar)
-
-
-def evade_obstacle() -> None:
-    """Evade an obstacle that comes, so that every kernel is called."""
-    states = np.array([[2.0, 0.0, -1.0, 0.0]])
-    one = Tracks(0.0, np.array([0]), states, np.zeros((1, 4, 4)), np.array([0.3]))
-    spec = GridSpec(40, 40, 0.1, -2.0, -2.0)
-    costs = np.zeros(spec.shape, np.uint8)
-    still = Pose2D(0.0, 0.0), Twist2D()
-    around = Surroundings(spec, costs, *still, 0.3, 0.5, 0.5, False, period_s=0.1)
-    params = EvasionParams(True, max_acceleration_mps2=6.0)
-    evade(params, around, one, 0.0, np.zeros((1, 2)), Twist2D(), (0.0, 0.0))
+        scan = Scan(now_s, -math.pi, 2 * math.pi / 256, 0.02, 60.0, ranges)
+        situation = ScanSituation(now_s, "scan", lidar, True, 0.0, heights_m, np.empty((0, 3)))
+        filters.filter(scan, situation)
 
 
 def _oncoming_peer(here: Pose2D, now_s: float) -> Peer:
@@ -126,7 +102,6 @@ def _add_scans(navigator: Navigator, here: Pose2D) -> None:
     scan = Scan(0.0, -math.pi, 2 * math.pi / 64, 0.02, 60.0, ranges)
     lidar = Pose3D(here.x_m, here.y_m, 1.0)
     is_moving = np.zeros(len(ranges), np.bool_)  # beams that clear only, as on moving obstacles
-    ScanValidator([]).rejection_reason(scan, lidar, 0.0)
     for costmap in (navigator.global_costmap, navigator.local_costmap):
         for layer in costmap.layers.values():
             if isinstance(layer, ObstacleLayer):
@@ -169,8 +144,6 @@ def simulate() -> None:
 def fly_missions() -> None:
     """Call every kernel that any configuration may call."""
     simulate()
-    track_obstacle()
-    evade_obstacle()
     for costmap, node in _MISSIONS:
         warm_up(
             config.load(
@@ -188,30 +161,5 @@ def fly_missions() -> None:
         )
 
 
-def main() -> None:
-    """Compile the kernels and build the library of them, unless it is there already."""
-    fly_missions()
-    if jit.numba_kernels():
-        if library.FOLDER is not None:
-            _build(library.library_path(library.FOLDER))
-    elif jit.library_remarks():  # it lacks some types
-        again = [sys.executable, "-m", "quad_nav.scenario.warm_up"]
-        # -m imports from the folder in which it starts.
-        sources, environment = Path(__file__).parents[2], {**os.environ, "QUAD_KERNELS": "numba"}
-        subprocess.run(again, check=True, cwd=sources, env=environment)
-
-
-def _build(path: Path) -> None:
-    from quad_nav.kernels.build_library import BuildError, build  # here: it imports numba
-
-    try:
-        build(jit.numba_kernels(), path)
-    except BuildError as error:
-        line = f"kernels: the library is not built: {error}; numba loads them"
-        print(printable(line), file=sys.stderr)
-    else:
-        print(printable(f"kernels: built {path}"))
-
-
 if __name__ == "__main__":
-    main()
+    fly_missions()

@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import leading_velocity
-from quad_nav.kernels.flight_law import rotation_from_quaternion
 from quad_nav.sim.flight import Airframe, AutopilotResponse, BodyState, FlightLaw, FlightParams
+from quad_nav.sim.flight_law import rotation_from_quaternion
 
 Floats = NDArray[np.float64]
 

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Twist2D
-from quad_nav.kernels import flight_law
+from quad_nav.sim import flight_law
 from quad_nav.sim.scene import BODY_RADIUS_M
 
 Floats = NDArray[np.float64]

@@ -202,7 +202,7 @@ def rectangles_of(marked: NDArray[np.bool_]) -> NDArray[np.int64]:
     Returns:
         int64[n, 4]: first column, first row, width and height in cells.
     """
-    from quad_nav.kernels.rectangles import cover  # here: scenes load without numba otherwise
+    from quad_nav.sim.rectangles import cover  # here: scenes load without numba otherwise
 
     left = marked.copy()
     parts, row = [], 0

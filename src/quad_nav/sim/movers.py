@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import rotate_vectors
-from quad_nav.kernels.keyframes import Keyframes, fill_poses
 from quad_nav.sim.crowd_record import CrowdRecord
+from quad_nav.sim.keyframes import Keyframes, fill_poses
 from quad_nav.sim.motion import SPLINE, Motion
 from quad_nav.sim.scene import Box, Obstacle, Scene, placed
 from quad_nav.sim.walkers import REACTION_S, Crowd, round_down, walks

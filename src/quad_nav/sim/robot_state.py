@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose3D, Twist2D, rotate
-from quad_nav.kernels.flight_law import planar_states
 from quad_nav.sim.flight import BodyState
+from quad_nav.sim.flight_law import planar_states
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class RobotStates(Sequence[RobotState]):
 
     @cached_property
     def planar(self) -> NDArray[np.float64]:
-        """Planar states float64[n, 8], see ``kernels.flight_law.planar_states``."""
+        """Planar states float64[n, 8], see ``sim.flight_law.planar_states``."""
         states = np.empty((len(self._states), 8))
         planar_states(self.bodies.rows, states)
         return states

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import yaw_rotations
-from quad_nav.kernels.lidar import SolidGrid, Solids
-from quad_nav.kernels.rays import BOX, CYLINDER, SPHERE
+from quad_nav.sim.lidar_kernel import SolidGrid, Solids
+from quad_nav.sim.rays import BOX, CYLINDER, SPHERE
 from quad_nav.sim.scene import Box, Obstacle, Scene, Sphere
 
 _MANY = 500
@@ -78,7 +78,7 @@ def solids_of(obstacles: Sequence[Obstacle]) -> Solids:
 
 
 def _shape(solid: Obstacle) -> Tuple[int, float, Tuple[float, float, float]]:
-    """Return kind, yaw and sizes as in ``kernels.rays``."""
+    """Return kind, yaw and sizes as in ``sim.rays``."""
     if isinstance(solid, Box):
         return BOX, solid.yaw_rad, (solid.size_x_m / 2, solid.size_y_m / 2, solid.height_m / 2)
     if isinstance(solid, Sphere):

@@ -30,9 +30,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.errors import InputError
-from quad_nav.kernels.social_force import Ground, People, SocialForce, step_people, walk
 from quad_nav.sim.motion import Motion, Walkers
 from quad_nav.sim.scene import Scene
+from quad_nav.sim.social_force import Ground, People, SocialForce, step_people, walk
 
 Floats = NDArray[np.float64]
 

@@ -16,11 +16,10 @@ from typing import Any, List, Optional, Sequence, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.costmap.tracks import Tracks
 from quad_nav.timing import Schedule
 from quad_nav.topics.markers import ARROW, CYLINDER, TEXT, Marker, Rgba
 from quad_nav.topics.validation import MAX_MAGNITUDE
-from quad_nav.tracking.tracker import ObstacleTracker
-from quad_nav.tracking.tracks import Tracks
 
 MARKERS_TOPIC, CLOUD_TOPIC = "moving_obstacles", "moving_obstacles_cloud"
 """Names below ``/move_base{i}``."""
@@ -68,9 +67,8 @@ class TrackKind(IntEnum):
 class TrackSchedule:
     """Decides when tracks and suspects are published: at a rate, and once more when they end."""
 
-    def __init__(self, tracker: ObstacleTracker) -> None:
-        """Publish the tracks of a tracker."""
-        self._tracker = tracker
+    def __init__(self) -> None:
+        """Publish nothing yet."""
         self._schedule = Schedule(RATE_HZ)
         self._had_any = False
         self.restart(0.0)
@@ -79,9 +77,9 @@ class TrackSchedule:
         """Restart after a clock jump."""
         self._schedule.start(now_s)
 
-    def pop(self, now_s: float) -> Optional[Tracks]:
+    def pop(self, now_s: float, tracks: Optional[Tracks]) -> Optional[Tracks]:
         """Return the tracks to publish now, None if nothing is due or nothing has changed."""
-        tracks = self._tracker.tracks
+        tracks = Tracks.none(now_s) if tracks is None else tracks
         has_any = tracks.any_may_move
         if not (has_any or self._had_any) or not self._schedule.pop(now_s):
             return None
@@ -89,15 +87,14 @@ class TrackSchedule:
         return tracks
 
 
-def track_markers(tracks: Tracks, unseen_s: NDArray[np.float64], frame: str) -> List[Marker]:
+def track_markers(tracks: Tracks, frame: str) -> List[Marker]:
     """Return discs, arrows of the velocities, ellipses of two sigma and numbers.
 
     Suspects have discs of another colour and arrows only.
 
     Args:
-        tracks: The tracks and suspects.
-        unseen_s: float64[n], times for which the tracks have not been seen; those discs are paler.
-        frame: Frame of both.
+        tracks: The tracks and suspects; discs of those that are not seen now are paler.
+        frame: Their frame.
     """
     markers = [
         marker
@@ -106,7 +103,7 @@ def track_markers(tracks: Tracks, unseen_s: NDArray[np.float64], frame: str) -> 
             tracks.states.tolist(),
             tracks.covariances,
             tracks.radii_m.tolist(),
-            unseen_s.tolist(),
+            tracks.unseen_s.tolist(),
         )
         for marker in _markers(frame, number, state, covariance, radius_m, hidden_s > 0.0)
     ]
@@ -182,17 +179,16 @@ def cloud_rows(tracks: Tracks) -> NDArray[np.float32]:
     return rows
 
 
-def track_rows(tracks: Tracks, unseen_s: NDArray[np.float64]) -> NDArray[np.float64]:
+def track_rows(tracks: Tracks) -> NDArray[np.float64]:
     """Return tracks and suspects as one table.
 
     Args:
         tracks: The tracks and suspects.
-        unseen_s: float64[n], times for which the tracks have not been seen.
 
     Returns:
         float64[k, 6], columns x and y (m), their velocities (m/s), radius (m) and ``TrackKind``.
     """
-    kinds = np.where(unseen_s > 0.0, TrackKind.HIDDEN, TrackKind.SEEN)
+    kinds = np.where(tracks.unseen_s > 0.0, TrackKind.HIDDEN, TrackKind.SEEN)
     known = np.column_stack((tracks.states, tracks.radii_m, kinds))
     kinds = np.full(len(tracks.suspects), TrackKind.SUSPECT)
     return np.vstack((known, np.column_stack((tracks.suspects, kinds))))

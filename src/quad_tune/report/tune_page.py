@@ -9,10 +9,11 @@ from quad_nav.recording.trace import FlightTrace
 from quad_nav.report import style
 from quad_nav.report.encounters import encounters
 from quad_nav.report.flight_metrics import flight_metrics
+from quad_nav.report.matplotlib_figures import paths_picture, timeline_picture
 from quad_nav.report.measures import resampled_tracks
 from quad_nav.report.page import MAX_STRIPS, Page, Section, picture, render
-from quad_nav.report.paths_picture import paths_picture
-from quad_nav.report.timeline_picture import timeline_picture
+from quad_nav.report.paths import flown_paths
+from quad_nav.report.timeline import timeline
 from quad_tune import study_text
 from quad_tune.report.outcome_pictures import held_out_picture, pareto_picture
 from quad_tune.report.search_pictures import (
@@ -87,8 +88,10 @@ def _flights(before: FlightTrace, after: FlightTrace) -> Section:
         metrics = flight_metrics(trace, tracks)
         notes += [f"{name.capitalize()}: {metrics.mission_s:.1f} s", ""]
         pictures += [
-            picture(f"paths_{name}", f"Paths, {name}", paths_picture(trace, tracks, shown)),
-            picture(f"timeline_{name}", f"Goals, {name}", timeline_picture(trace)),
+            picture(
+                f"paths_{name}", f"Paths, {name}", paths_picture(flown_paths(trace, tracks, shown))
+            ),
+            picture(f"timeline_{name}", f"Goals, {name}", timeline_picture(timeline(trace))),
         ]
     return Section(
         "flights",

@@ -21,7 +21,7 @@ _SOON_S = 0.5  # a file that is no flight is mostly refused within, and needs no
 def replay(flight: Path, address: str, port: int, open_it: bool) -> None:
     """Play a recorded flight on a page in the browser.
 
-    FLIGHT is a bag or an MCAP file from quad fly --record, or a bag from rosbag record. The page
+    FLIGHT is a bag from quad fly --record or rosbag record. The page
     plays, pauses, and jumps to any time; it plays as soon as it is open. Ctrl-C ends it.
 
     Exit status: 0 after Ctrl-C, 2 for a file that cannot be read as a flight.

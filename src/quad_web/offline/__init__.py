@@ -1,1 +1,1 @@
-"""The page of a flight without ROS."""
+"""The page of a flight without ROS: one that flies, and one that has not begun."""

@@ -233,7 +233,7 @@ def _navigator_items(view: NavigatorView) -> List[Item]:
     if view.scan is not None:
         items.append(scan_item(view.robot, *view.scan))
     if view.track is not None:
-        rows_of = track_rows(view.track.tracks, view.track.unseen_s)
+        rows_of = track_rows(view.track.tracks)
         items.append(track_item(view.robot, rows_of, view.track.map_from_frame))
     for layer, costmap in view.costmaps.items():
         items.append(

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.grid import GridSpec
-from quad_nav.recording.bag_index import RecordingIndex
 from quad_nav.recording.bag_info import LARGEST_M
+from quad_web.replay.recording_index import RecordingIndex
 
 _KEYFRAME_EVERY = 40  # updates
 _MOST_KEYFRAMES = 200

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Scan
 from quad_nav.recording.bag_file import Progress, no_progress
-from quad_nav.recording.bag_index import RecordingIndex
 from quad_nav.recording.bag_trace import read_recording
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.topics.markers import OBSTACLES_TOPIC
@@ -29,6 +28,7 @@ from quad_web.replay.recorded_robot import (
     decision_of,
     events_of,
 )
+from quad_web.replay.recording_index import RecordingIndex
 from quad_web.view import rows
 from quad_web.view.cells import cell_items
 from quad_web.view.items import (

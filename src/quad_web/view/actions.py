@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, FrozenSet, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.goal_edit import GoalEdit
+from quad_web.view.goal_edit import GoalEdit
 
 
 class Role(enum.Enum):

@@ -15,9 +15,9 @@ from quad_nav.errors import InputError
 from quad_nav.files.output import reason, write_bytes
 from quad_nav.files.user_files import read_bytes
 from quad_nav.mission.goal import goal_faults
-from quad_nav.mission.goal_edit import edited_text
 from quad_nav.mission.goal_file import MAX_BYTES, GoalSequence, PlaceCheck, parse_goals
 from quad_web.view.actions import Answer, GoalChange, GoalFileView
+from quad_web.view.goal_edit import edited_text
 
 
 class GoalFiles:

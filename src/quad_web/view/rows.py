@@ -263,7 +263,7 @@ def flight_item(
     """Return the item ``flight``.
 
     Args:
-        source: "ros", "offline" or "replay".
+        source: "preview", "ros", "offline" or "replay".
         title: Name of the scene, mission or file.
         state: "ready", "starting", "running", "paused", "ended" or "waiting" (for data).
         time_s: Time on the flight's clock.

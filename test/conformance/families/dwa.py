@@ -26,7 +26,7 @@ def check(path: Path) -> List[Difference]:
         {
             "base_local_planner": "dwa_local_planner/DWAPlannerROS",
             "DWAPlannerROS": meta["params"],
-            "fixes": UPSTREAM,
+            **UPSTREAM,
         }
     )
     params = configuration.local_planner

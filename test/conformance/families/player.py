@@ -37,7 +37,7 @@ _BITS = 16  # of one half of a column of voxels
 
 def load_upstream(**costmaps: Any) -> Configuration:
     """The configuration with these costmaps and every fix off."""
-    return load({**_as_set(costmaps), "fixes": UPSTREAM})
+    return load({**_as_set(costmaps), **UPSTREAM})
 
 
 def _as_set(values: Any) -> Any:

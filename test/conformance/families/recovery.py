@@ -57,7 +57,7 @@ class Replay:
                 "local_costmap": params["local_costmap"],
                 "recovery_behaviors": [{"name": _NAME, "type": self.meta["recovery"]}],
                 _NAME: params["recovery"],
-                "fixes": UPSTREAM,
+                **UPSTREAM,
             }
         )
         self.players = {

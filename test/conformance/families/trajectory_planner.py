@@ -35,9 +35,9 @@ def check(path: Path) -> List[Difference]:
 
 
 def _params(meta: Recorded) -> TrajectoryPlannerParams:
-    fixes = {**UPSTREAM, "respect_meter_scoring": True}
-    params = load({"TrajectoryPlannerROS": meta["params"], "fixes": fixes}).local_planner
-    return replace(params, meter_scoring=meta["meter_scoring_effective"])
+    params = load({"TrajectoryPlannerROS": meta["params"], **UPSTREAM}).local_planner
+    in_metres = meta["meter_scoring_effective"]
+    return replace(params, meter_scoring=in_metres, respect_meter_scoring=True)
 
 
 def _flags(oscillation: Oscillation, names: List[str], more: Dict[str, bool]) -> List[bool]:

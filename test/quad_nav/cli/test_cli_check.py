@@ -56,7 +56,7 @@ def test_shipped_configurations_have_no_errors():
     assert status == 0
     assert f"{CONFIG / 'default'}: no errors, " in output
     assert f"{CONFIG / 'tutorial'}: no errors, 1 warning" in output
-    assert "\n6 configurations: no errors, " in output
+    assert "\n5 configurations: no errors, " in output
 
 
 def test_the_four_files_are_one_set_in_the_launch_files_order(tmp_path):

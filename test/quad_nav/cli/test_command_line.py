@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from quad_nav.cli import COMMANDS, main
 from quad_nav.cli.fly import LIDAR_CASTERS, MAX_DRIFT
 from quad_nav.files.shipped import shipped
-from quad_nav.sim import odometry, simulation
+from quad_nav.sim import odometry, simulation_params
 from quad_tune.courses import Mission, MissionCourse, MissionOptions
 
 SOURCES = Path(__file__).resolve().parents[3] / "src"
@@ -46,14 +46,14 @@ def test_help_does_not_import_the_engine(arguments):
 
 def test_every_command_is_listed_with_its_own_text():
     text = CliRunner().invoke(main, []).output
-    for name, line in COMMANDS.items():
+    for name, (_, line) in COMMANDS.items():
         assert f"  {name:{max(map(len, COMMANDS))}}  {line}\n" in text
         command = main.get_command(click.Context(main), name)
         assert command is not None and command.name == name
 
 
 def test_constants_of_the_options_are_those_of_the_engine():
-    assert simulation.LIDAR_CASTERS == LIDAR_CASTERS
+    assert simulation_params.LIDAR_CASTERS == LIDAR_CASTERS
     assert odometry.MAX_DRIFT == MAX_DRIFT
 
 

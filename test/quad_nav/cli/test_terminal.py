@@ -201,7 +201,7 @@ def test_studies(tmp_path, mission):
     quad("sweep", *files, *over, shown=False)
 
 
-@pytest.mark.parametrize("name", ["a.bag", "a.mcap", f"{NAME}.bag", "a.txt"])
+@pytest.mark.parametrize("name", ["a.bag", f"{NAME}.bag", "a.txt"])
 def test_recordings(tmp_path, name):
     path = tmp_path / name
     path.write_text(f"#ROSBAG V2.0\n{EVIL}")

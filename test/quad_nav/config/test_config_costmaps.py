@@ -154,6 +154,7 @@ def test_map_type_voxel_makes_a_voxel_layer_of_the_costmaps_parameters():
         mark_threshold=1,
         publish_voxel_map=True,
         unknown_threshold=4,
+        observation_sources="scan",
         sources=(SourceParams("scan", "scan", data_type="LaserScan"),),
     )
     assert [str(remark) for remark in configuration.remarks if "local" in remark.place] == []

@@ -39,8 +39,8 @@ def test_the_default_is_the_one_in_force_at_start():
             [Difference("TrajectoryPlannerROS/holonomic_robot", False, True)],
         ),
         (
-            {"fixes": {"sensor_timeout": 0.0}},
-            [Difference("fixes/sensor_timeout", 0.0, 1.0, "seconds")],
+            {"sensor_timeout": 0.0},
+            [Difference("sensor_timeout", 0.0, 1.0, "seconds")],
         ),
         (
             {"local_costmap": {"inflation_radius": 0.8}},

@@ -2,42 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import pytest
 
 from quad_nav.config.local_planners import DWA_PLANNER, dwa_params, normalise_dwa
 from quad_nav.config.notes import CAUTION, CLAMPED, IGNORED, UNKNOWN, Notes
-from quad_nav.config.tables.dwa_planner import DWA_TABLE
 from quad_nav.control.dwa_planner import DwaParams
-
-FIXES = {"predict_goal_turn"}  # set by the group of that name, not by the planner's own
 
 
 def normalised(namespace, **node_level):
     tree, notes = {DWA_PLANNER: namespace, **node_level}, Notes("/move_base0")
     normalise_dwa(tree, notes)
     return tree, notes
-
-
-def test_every_field_has_a_spelling_and_the_same_default():
-    of_table = {
-        parameter.field: parameter.in_force for parameter in DWA_TABLE.parameters if parameter.field
-    }
-    assert of_table == {
-        field.name: field.default for field in fields(DwaParams) if field.name not in FIXES
-    }
-
-
-def test_defaults_are_valid():
-    for parameter in DWA_TABLE.parameters:
-        assert parameter.clamp(parameter.check(parameter.default)) == parameter.default
-
-
-def test_names_are_unique():
-    names = [parameter.name for parameter in DWA_TABLE.parameters]
-    names += [name for name, _ in DWA_TABLE.unsupported + DWA_TABLE.ignored]
-    assert len(names) == len(set(names))
 
 
 def test_an_empty_namespace_is_completed():

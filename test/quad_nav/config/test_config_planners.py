@@ -131,7 +131,9 @@ def test_dwa_flies_with_its_own_parameters_and_those_at_the_nodes_level():
 
     configuration = load(tree, "/nav")
 
-    assert configuration.local_planner == DwaParams(max_vel_x_mps=0.3, latch_xy_goal_tolerance=True)
+    assert configuration.local_planner == DwaParams(
+        max_vel_x_mps=0.3, latch_xy_goal_tolerance=True, controller_frequency_hz=10.0
+    )
     assert configuration.local_planner_period_s == 0.1
     assert [line for kind, line in told(tree)] == [
         "/nav/DWAPlannerROS/controller_frequency: rollouts assume 10.0 Hz, but the control"
@@ -147,7 +149,7 @@ def test_rotations_read_limits_of_the_trajectory_planner_when_it_is_not_chosen()
 
     configuration = load(tree, "/nav")
 
-    assert dict(configuration.recoveries)["rotate_recovery"].max_vel_theta_radps == 0.4
+    assert dict(configuration.recoveries)["rotate_recovery"].limits.max_vel_theta_radps == 0.4
     assert told(tree) == [
         (
             "unused",

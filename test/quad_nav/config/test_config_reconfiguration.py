@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from quad_nav.config import load, reconfigurable, updated, values
+from quad_nav.config.fixes import GROUPS
 from quad_nav.errors import InputError
 
 TREE = {
@@ -32,13 +33,13 @@ def test_namespaces(configuration):
         "local_costmap/static_layer",
         "local_costmap/obstacle_layer",
         "local_costmap/inflation_layer",
-        "fixes",
+        *GROUPS,
     ]
 
 
 def test_parameters_are_in_the_order_of_upstream(configuration):
     names = {
-        namespace: [parameter.name for parameter in parameters]
+        namespace: [parameter.name for parameter in parameters if not parameter.is_own]
         for namespace, parameters in reconfigurable(configuration).items()
     }
     assert names["local_costmap"] == [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from quad_nav.config import load
-from quad_nav.recovery import ClearCostmapParams, MoveSlowAndClearParams, RotateParams
+from quad_nav.recovery import ClearCostmapParams, MoveSlowAndClearParams, RotateParams, TurnLimits
 
 SEEING = {"observation_sources": "scan", "scan": {"data_type": "LaserScan"}}
 
@@ -256,7 +256,10 @@ def test_listed_recoveries_keep_their_order_and_parameters():
     assert configuration.recoveries == (
         (
             "look",
-            RotateParams(frequency_hz=10.0, max_vel_theta_radps=0.7, yaw_goal_tolerance_rad=0.2),
+            RotateParams(
+                frequency_hz=10.0,
+                limits=TurnLimits(max_vel_theta_radps=0.7, yaw_goal_tolerance_rad=0.2),
+            ),
         ),
         (
             "forget",

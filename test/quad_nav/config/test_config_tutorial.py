@@ -8,10 +8,13 @@ import pytest
 import yaml
 
 from quad_nav.config import load, load_files
+from quad_nav.config.configuration import MOVE_BASE_TABLE
+from quad_nav.config.fixes import GROUPS
+from quad_nav.config.local_planners import TRAJECTORY_PLANNER, TRAJECTORY_PLANNER_TABLE
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
-from quad_nav.recovery import ClearCostmapParams, RotateParams
+from quad_nav.recovery import ClearCostmapParams, RotateParams, TurnLimits
 
 CONFIG = Path(__file__).resolve().parents[3] / "config"
 RECORDED = Path(__file__).parent / "data" / "tutorial_parameters.yaml"
@@ -98,7 +101,11 @@ def test_there_are_no_other_files():
 def test_tree_is_what_move_base_leaves_on_the_parameter_server():
     left = load(tutorial(), "/move_base0").to_tree()
     recorded = yaml.safe_load(RECORDED.read_text())
-    del left["fixes"]  # not in the original
+    for group in GROUPS:
+        del left[group]  # not in the original
+    for namespace, table in (("", MOVE_BASE_TABLE), (TRAJECTORY_PLANNER, TRAJECTORY_PLANNER_TABLE)):
+        for own in (one for one in table.reconfigurable if one.is_own):
+            del (left[namespace] if namespace else left)[own.name]
     assert left == recorded
     assert typed(left) == typed(recorded)  # 12 and 12.0 are equal, and not the same parameter
 
@@ -146,7 +153,7 @@ def test_costmaps():
     layers = (
         (
             "obstacle_layer",
-            ObstacleLayerParams(obstacle_range_m=2.5, raytrace_range_m=3.0, sources=(source,)),
+            ObstacleLayerParams(observation_sources="base_scan", sources=(source,)),
         ),
         ("inflation_layer", InflationLayerParams(inflation_radius_m=0.4)),
     )
@@ -189,7 +196,9 @@ def test_default_recoveries():
     assert isinstance(conservative, ClearCostmapParams) and conservative.reset_distance_m == 1.0
     assert aggressive.reset_distance_m == pytest.approx(4 * 0.46)
     assert conservative.layer_names is None
-    assert rotate == RotateParams(max_vel_theta_radps=0.7, min_in_place_vel_theta_radps=1.0)
+    assert rotate == RotateParams(
+        limits=TurnLimits(max_vel_theta_radps=0.7, min_in_place_vel_theta_radps=1.0)
+    )
 
 
 def test_shipped_default_loads_without_a_remark():

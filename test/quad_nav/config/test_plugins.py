@@ -13,12 +13,15 @@ import pytest
 import yaml
 
 from quad_nav import config
+from quad_nav.config.fixes import GROUPS
 from quad_nav.config.plugins import Plugin, plugin_name
-from quad_nav.errors import GoalOutsideMap, InputError, NoPath
-from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.costmap.scan_filter import ScanSituation
+from quad_nav.errors import GoalOutsideMap, InputError, NoPath, PluginError
+from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.grid import INSCRIBED, LETHAL
+from quad_nav.navigator.command_filter import StopReason
 from quad_nav.navigator.tick import RobotPoses, State, Trigger
-from quad_nav.scenario.assembly import apply_configuration, build_navigator
+from quad_nav.scenario.assembly import apply_configuration, build_navigator, build_scan_filters
 
 PAGE = (Path(__file__).resolve().parents[3] / "docs" / "plugins.md").read_text()
 COSTMAP = {
@@ -112,6 +115,47 @@ def test_examples_fly_to_the_goal(tree):
     np.testing.assert_allclose(plans[0][[0, -1]], [[1.0, 2.0, 1.0], [3.0, 5.0, 1.0]])
 
 
+def test_the_example_filter_limits_accelerations_and_no_stop(tree):
+    """At 10 Hz, 0.4 m/s^2 is 0.04 m/s from one command to the next."""
+    navigator = build_navigator(config.load(tree))
+
+    ticks, _ = fly(navigator, HERE, GOAL, 30.0)
+
+    commands = [tick.command.vx_mps for tick in ticks if tick.command]
+    assert commands[:4] == pytest.approx([0.04, 0.08, 0.12, 0.16])
+    assert np.diff(commands[:-1]).max() <= 0.04 + 1e-9 and max(commands) == pytest.approx(0.4)
+    assert ticks[-1].stop is StopReason.GOAL_ENDED and commands[-1] == 0.0
+
+
+def test_the_example_scan_filter_masks_beams(tree):
+    filters = build_scan_filters(config.load(tree))
+    ranges_m = np.array([0.1, 3.0], np.float32)
+    scan = Scan(0.0, 0.0, 1.0, 0.02, 60.0, ranges_m)
+    situation = ScanSituation(
+        0.0, "scan", Pose3D(0.0, 0.0, 1.0), True, 0.5, (0.0, 2.0), np.empty((0, 3))
+    )
+    filtered = filters.filter(scan, situation)
+    assert filtered.masked.tolist() == [True, False] and not filtered.rejected
+
+
+def test_a_filter_that_returns_no_command_is_a_mistake(package):
+    package(
+        "wrong.py",
+        """
+        from quad_nav.navigator.command_filter import CommandFilter
+
+        class Forgets(CommandFilter):
+            def __init__(self, params): ...
+            def filter(self, command, situation): ...
+        """,
+    )
+    tree = {"command_filters": [{"name": "a", "type": "my_package.wrong.Forgets"}]}
+    navigator = build_navigator(config.load(tree))
+    navigator.set_goal(GOAL, 0.0)
+    with pytest.raises(PluginError, match="Forgets.filter returned .*; expected the Command"):
+        navigator.tick(0.0, RobotPoses(HERE, HERE), Twist2D())
+
+
 def test_example_layer_is_in_the_costmap_and_inflated(tree):
     navigator = build_navigator(config.load(tree))
     navigator.tick(0.0, RobotPoses(HERE, HERE), Twist2D())
@@ -172,7 +216,7 @@ def test_nothing_of_a_plugin_is_reconfigurable(tree):
         "global_costmap/inflation_layer",
         "local_costmap",
         "local_costmap/inflation_layer",
-        "fixes",
+        *GROUPS,
     ]
 
 

@@ -12,10 +12,10 @@ from local_planner_cases import ORIGIN, REST, SQUARE, WINDOW, boxed_in, free, li
 from quad_nav.control.dwa_critics import NO_LEGAL_TRAJECTORY
 from quad_nav.control.dwa_oscillation import OscillationCritic
 from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
+from quad_nav.control.dwa_search import is_forbidden
 from quad_nav.errors import NoLocalPlan, NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL
-from quad_nav.kernels.dwa_search import is_forbidden
 
 PERIOD_S = 0.2
 PARAMS = DwaParams(max_vel_y_mps=0.0, min_vel_y_mps=0.0, predict_goal_turn=False)

@@ -10,13 +10,13 @@ import pytest
 from local_planner_cases import ORIGIN, REST, SQUARE, WINDOW, boxed_in, free, line
 
 from quad_nav.control.dwa_critics import NO_LEGAL_TRAJECTORY, Critics
+from quad_nav.control.dwa_kernel import is_within_reach, obstacle_cost, spaced, step_count
 from quad_nav.control.dwa_oscillation import OscillationCritic
 from quad_nav.control.dwa_planner import DwaParams
 from quad_nav.control.dwa_samples import velocity_samples
+from quad_nav.control.dwa_search import TERMS, fill_terms, footprint_scale
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL
-from quad_nav.kernels.dwa import is_within_reach, obstacle_cost, spaced, step_count
-from quad_nav.kernels.dwa_search import TERMS, fill_terms, footprint_scale
 
 PERIOD_S = 0.2
 PARAMS = DwaParams(max_vel_y_mps=0.0, min_vel_y_mps=0.0, predict_goal_turn=False)

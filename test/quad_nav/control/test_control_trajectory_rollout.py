@@ -13,10 +13,10 @@ from quad_nav.control.map_grid import distance_grids
 from quad_nav.control.rollout import Rollout, costmap_view, footprint_cost
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
 from quad_nav.control.velocity_search import velocity_window
+from quad_nav.control.velocity_search_kernel import spaced
+from quad_nav.costmap.collision import highest_near
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, LETHAL, UNKNOWN, GridSpec
-from quad_nav.kernels.collision import highest_near
-from quad_nav.kernels.velocity_search import spaced
 
 PARAMS = TrajectoryPlannerParams(
     holonomic_robot=False,

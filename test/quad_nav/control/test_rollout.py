@@ -8,19 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from quad_nav.control.lanes import OFF_MAP, UNCERTAIN
 from quad_nav.control.rollout import Rollout
-from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
-from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.grid import FREE, LETHAL, GridSpec
-from quad_nav.kernels.cost_grid import CostmapView
-from quad_nav.kernels.lanes import OFF_MAP, UNCERTAIN
-from quad_nav.kernels.motion import (
+from quad_nav.control.sample_motion import (
     RolloutParams,
     last_cells,
     longest,
     travel,
 )
-from quad_nav.kernels.velocity_search import NO_SAMPLE, SampleRules, VelocityWindow, spaced
+from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.control.velocity_search_kernel import NO_SAMPLE, SampleRules, VelocityWindow, spaced
+from quad_nav.costmap.cost_grid_kernel import CostmapView
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.grid import FREE, LETHAL, GridSpec
 
 PARAMS = TrajectoryPlannerParams(holonomic_robot=False)
 FOOTPRINT = np.array([[0.2, 0.15], [-0.2, 0.15], [-0.2, -0.15], [0.2, -0.15]])

@@ -166,7 +166,9 @@ def test_inflation_equals_the_original_brushfire(seed):
 def test_distances_that_do_not_fit_into_32_bits_inflate_alike():
     master = CostGrid(GridSpec(400, 3, 1.0))
     master.costs[1, 0] = LETHAL
-    layer = InflationLayer(InflationLayerParams(True, 200.0, 0.001), 1.0, 0.5)
+    layer = InflationLayer(
+        InflationLayerParams(inflation_radius_m=200.0, cost_scaling_factor=0.001), 1.0, 0.5
+    )
     assert layer._ranks.states.dtype == np.int64
     layer.update_costs(master, Window(0, 400, 0, 3))
     assert master.costs[1, :201].tolist() == layer.cost_table[0, :201].tolist()

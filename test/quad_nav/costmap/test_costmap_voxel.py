@@ -12,9 +12,9 @@ from quad_nav.costmap.cost_grid import NOWHERE, Bounds, CostGrid, Window
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.voxel import VoxelLayerParams
+from quad_nav.costmap.voxel_kernel import VoxelGrid, clear_voxel_line
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.grid import UNKNOWN, GridSpec
-from quad_nav.kernels.voxels import VoxelGrid, clear_voxel_line
 
 ROW = 2  # everything happens in the row with y from 2 to 3 m
 SOURCE = SourceParams(

@@ -292,13 +292,11 @@ def switches_of(navigator):
 
 
 def test_switches_reach_the_layers_also_in_flight():
-    assert switches_of(build_navigator(load({**TREE, "fixes": UPSTREAM}))) == {False}
+    assert switches_of(build_navigator(load({**TREE, **UPSTREAM}))) == {False}
     configuration = load(TREE)
     navigator = build_navigator(configuration)
     assert switches_of(navigator) == {True}
-    configuration = updated(
-        configuration, "fixes", dict.fromkeys(STATIC_SWITCHES + VOXEL_SWITCHES, False)
-    )
+    configuration = updated(configuration, "fixes", {"upstream": True})
     apply_configuration(navigator, configuration)
     assert switches_of(navigator) == {False}
     apply_configuration(navigator, updated(configuration, "local_costmap", {"width": 5}))

@@ -25,9 +25,9 @@ TREE = {
 }
 
 
-def navigator_with(costmap=None, **fixes):
+def navigator_with(costmap=None, **own):
     """A navigator before a wall across its map, from y = 0.5 m up: only the edge is free."""
-    tree = {"global_costmap": {**TREE, **(costmap or {})}, "fixes": fixes}
+    tree = {"global_costmap": {**TREE, **(costmap or {})}, **own}
     navigator = build_navigator(load(tree))
     navigator.global_costmap.costs[5:, 50] = LETHAL
     return navigator

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from quad_nav.costmap.observation import Observation, ObservationBuffer, SourceParams
-from quad_nav.kernels.observations import Ranges
+from quad_nav.costmap.observation_kernel import Ranges
 
 
 def observation(stamp_s: float, count: int) -> Observation:

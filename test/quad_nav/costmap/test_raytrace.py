@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from quad_nav.costmap.cost_grid_kernel import CostmapView
 from quad_nav.costmap.observation import _make_stack
-from quad_nav.kernels.cost_grid import CostmapView
-from quad_nav.kernels.observations import Ranges, include_rays, store_observation
-from quad_nav.kernels.obstructed_cells import MAX_OBSTRUCTED, SECTORS, find_obstructed, sector_of
-from quad_nav.kernels.raytrace import clear_all_rays, clear_rays, mark_all_points
+from quad_nav.costmap.observation_kernel import Ranges, include_rays, store_observation
+from quad_nav.costmap.obstructed_cells import MAX_OBSTRUCTED, SECTORS, find_obstructed, sector_of
+from quad_nav.costmap.raytrace import clear_all_rays, clear_rays, mark_all_points
 
 RESOLUTION_M = 0.05
 NOWHERE = (1e30, 1e30, -1e30, -1e30)

@@ -11,8 +11,9 @@ import pytest
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.costmap.scan_filter import ScanFilters
 from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, sinks_of
-from quad_nav.costmap.scan_validator import ScanValidatorParams
+from quad_nav.costmap.scan_validator import ScanValidator, ScanValidatorParams
 from quad_nav.geometry import Pose3D, Scan
 
 SOURCE = SourceParams("laser", data_type="LaserScan", expected_update_period_s=0.5)
@@ -31,7 +32,7 @@ def costmap_of(*sources):
 
 
 def intake_of(*costmaps, params=DEFAULTS):
-    return ScanIntake(sinks_of(costmaps), params)
+    return ScanIntake(sinks_of(costmaps), ScanFilters([ScanValidator(params)]), "map")
 
 
 def at(pose, intake):
@@ -80,11 +81,10 @@ def test_without_validation_every_scan_reaches_the_layers():
 
 
 def test_validation_is_switched_while_it_runs():
-    costmap = costmap_of(SOURCE)
-    intake = intake_of(costmap)
-    intake.reconfigure(ACCEPT_ALL)
+    validator = ScanValidator(ACCEPT_ALL)
+    intake = ScanIntake(sinks_of([costmap_of(SOURCE)]), ScanFilters([validator]), "map")
     assert intake.add_scan(scan(1.0), at(LIDAR, intake), 9.0, 9.0) == ""
-    intake.reconfigure(REJECT)
+    validator.params = REJECT
     assert intake.add_scan(scan(1.0), at(LIDAR, intake), 9.0, 9.0) != ""
 
 

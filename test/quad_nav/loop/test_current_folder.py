@@ -8,14 +8,12 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import matplotlib
 import pytest
 
 from quad_nav.report.style import styled
-from quad_nav.scenario import warm_up
 
 ROOT = Path(__file__).parents[3]
 NAMES = (
@@ -147,16 +145,6 @@ def test_no_program_is_started_from_the_current_folder(path):
         if re.search(r'python3"?,? "?-m"?,? "?quad', line)
     ]
     assert lines == []
-
-
-def test_kernels_are_compiled_again_from_the_sources(monkeypatch):
-    found = SimpleNamespace()
-    monkeypatch.setattr(warm_up, "fly_missions", lambda: None)
-    monkeypatch.setattr(warm_up.jit, "numba_kernels", lambda: [])
-    monkeypatch.setattr(warm_up.jit, "library_remarks", lambda: ["lacks some types"])
-    monkeypatch.setattr(subprocess, "run", lambda command, **given: vars(found).update(given))
-    warm_up.main()
-    assert found.cwd == ROOT / "src"
 
 
 def test_pictures_follow_no_file_of_the_current_folder(tmp_path):

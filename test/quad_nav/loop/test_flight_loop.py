@@ -16,7 +16,6 @@ from quad_nav.loop import offline_setup, shares_of, worker_process
 from quad_nav.loop.flight_loop import FlightLoop
 from quad_nav.loop.navigator_group import NavigatorGroup
 from quad_nav.loop.worker_process import WorkerProcessError
-from quad_nav.peers.links import LinkOutages
 from quad_nav.peers.peer import Intention
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.lidar import LidarParams
@@ -73,47 +72,6 @@ class Parking(NavigatorGroup):
         result = super().tick(number, now_s, states, peers)
         assert result.goal_waits is False
         return replace(result, tick=replace(result.tick, command=None, notes=["parked"]))
-
-
-class Listening(NavigatorGroup):
-    """A group that keeps the ages of what its robots have heard of their peers."""
-
-    def tick(self, number, now_s, states, peers):
-        self.ages_s = [*getattr(self, "ages_s", []), *(now_s - peer.stamp_s for peer in peers)]
-        return super().tick(number, now_s, states, peers)
-
-
-@pytest.fixture(scope="module")
-def near(setup):
-    """The same robots, 2 m apart."""
-    starts = (Pose2D(2.0, 1.5), Pose2D(4.0, 1.5))
-    return replace(setup, scene=replace(setup.scene, starts=starts))
-
-
-def test_a_robot_keeps_the_last_word_of_a_peer_whose_link_is_cut(near):
-    heard = {}
-    for share in (0.0, 0.5):
-        links = LinkOutages(share, mean_outage_s=1.0)
-        loop = started(replace(near, links=links), [(0, 1)], make_group=Listening)
-        try:
-            fly(loop, 200)
-            heard[share] = np.array(loop.group.ages_s)
-        finally:
-            loop.close()
-    assert not heard[0.0].any()
-    assert heard[0.5].max() > 0.5  # peer_timeout: the robots are lost to each other
-    assert 0.2 < (heard[0.5] > 0.0).mean() < 0.8
-
-
-def test_outages_are_those_of_the_flight_in_any_number_of_processes(near):
-    rows = []
-    for shares in ([(0, 1)], [(0,), (1,)]):
-        loop = started(replace(near, links=LinkOutages(0.5, 1.0)), shares)
-        try:
-            rows.append(fly(loop, 100))
-        finally:
-            loop.close()
-    assert np.array_equal(*rows)
 
 
 def test_robots_are_divided_and_no_share_but_the_first_is_empty():

@@ -2,36 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from test_stop_without_data import Threatened, hovers
-from test_tracking_flights import walker
 
 import quad_nav
 from quad_nav.config import updated
 from quad_nav.costmap.scan_intake import SensorPose
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose3D, Scan
-from quad_nav.loop.inspection import TRACK, Inspection
+from quad_nav.loop.inspection import Inspection
 from quad_nav.offline import flight as offline
 
 GOALS = [[[1.0, 4.5]], [[8.5, 1.5]]]
-FIXES = {"track_moving_obstacles": True, "reject_implausible_scans": False, "sensor_timeout": 0.2}
-EVERY = {f"fixes/{name}": value for name, value in FIXES.items()}
+EVERY = {
+    "reject_implausible_scans": False,
+    "sensor_timeout": 0.2,
+}
 
 
 def setup_of(config="default", robots=2):
     simulation = quad_nav.lidar_simulation(beams=128)
-    setup = quad_nav.prepare(goals=GOALS[:robots], config=config, simulation=simulation)
-    walks = walker((5.0, 1.5), (5.0, 6.0))
-    return replace(setup, scene=replace(setup.scene, moving=(walks,)))
+    return quad_nav.prepare(goals=GOALS[:robots], config=config, simulation=simulation)
 
 
 def assert_follows(robot):
-    """Every part of a robot has the values of ``FIXES``."""
-    assert robot.tracker.params.track_moving_obstacles
+    """Every part of a robot has the values of ``EVERY``."""
     assert robot.navigator.params.sensor_timeout_s == 0.2
     for intake in robot.intakes:
         assert intake.expected_period_s == 0.2
@@ -48,15 +43,15 @@ def test_every_part_follows_python():
             flight.step()
         robots = flight._loop.offline_robots
         assert_follows(robots[0])
-        assert len(robots[0].tracker.tracks) == 1 and len(robots[1].tracker.tracks) == 0
+        assert robots[1].navigator.params.sensor_timeout_s == 0.5
 
 
 def test_no_part_follows_a_refused_change():
     with quad_nav.Flight(setup_of()) as flight:
-        with pytest.raises(InputError, match="fixes/sensor_timeout"):
-            flight.reconfigure(0, {**EVERY, "fixes/sensor_timeout": "soon"})
+        with pytest.raises(InputError, match="sensor_timeout"):
+            flight.reconfigure(0, {**EVERY, "sensor_timeout": "soon"})
         robot = flight._loop.offline_robots[0]
-        assert not robot.tracker.params.track_moving_obstacles
+        assert robot.navigator.params.sensor_timeout_s == 0.5
         assert robot.intakes[0].is_late(0.0, 100.0)
 
 
@@ -72,14 +67,16 @@ def test_every_part_follows_in_each_process(processes):
     flight = offline.Flight(setup_of(), processes=processes)
     try:
         for robot in (0, 1):
-            configuration = updated(flight.robots[robot].configuration, "fixes", FIXES)
+            configuration = flight.robots[robot].configuration
+            for path, value in EVERY.items():
+                namespace, _, name = path.rpartition("/")
+                configuration = updated(configuration, namespace, {name: value})
             flight.reconfigure(robot, configuration)
         for robot in flight.offline_robots.values():
             assert_follows(robot)
         while flight.now_s < 4.0:
             flight.advance()
-        views = flight.loop.inspect(Inspection({TRACK: frozenset((0, 1))}))
-        assert [len(view.track.tracks) for view in views] == [1, 1]
+        views = flight.loop.inspect(Inspection())
         assert [view.stopped_reason for view in views] == ["", ""]
         for robot in (0, 1):
             flight.loop.enable_lidar(robot, False)
@@ -99,17 +96,5 @@ def test_the_validator_follows_a_longer_time_out():
         lidar = Pose3D(1.0, 1.0, 0.3)
         poses = [SensorPose(lidar, lidar)] * len(intake.sinks)
         assert "expected less than 1.00 s" in intake.add_scan(scan, poses, 1.5, 1.5)
-        flight.reconfigure(0, {"fixes/sensor_timeout": 2.0})
+        flight.reconfigure(0, {"sensor_timeout": 2.0})
         assert intake.add_scan(scan, poses, 1.5, 1.5) == ""
-
-
-@pytest.mark.parametrize("frequency_hz", [2.0, 20.0])
-def test_an_idle_robot_evades_at_a_changed_frequency(frequency_hz):
-    flight = Threatened()
-    hovers(flight)
-    flight.ticks(1.0)
-    params = replace(flight.navigator.params, controller_frequency_hz=frequency_hz)
-    flight.navigator.set_params(params)
-    ticks = [tick for tick in flight.ticks(3.0) if tick.command]
-    periods = np.diff([tick.now_s for tick in ticks])
-    assert len(ticks) > 5 and periods == pytest.approx(1.0 / frequency_hz)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from quad_nav.mission.goal_edit import GoalEdit, edited_text
+from quad_web.view.goal_edit import GoalEdit, edited_text
 
 GOALS = '{\n  "retries": 2,\n  "goals": [\n    [1.0, 5.0],\n    [7.0, 3.50, 1.57]\n  ]\n}\n'
 

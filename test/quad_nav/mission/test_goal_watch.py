@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from quad_nav.geometry import Pose2D, Pose3D
-from quad_nav.kernels.flight_law import planar_states
 from quad_nav.mission.flight_log import FlightLog, RobotLog
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.goal_file import GoalSequence, SequenceSettings
@@ -17,6 +16,7 @@ from quad_nav.mission.sequencer import SendGoal
 from quad_nav.navigator.tick import Outcome, State, Tick
 from quad_nav.offline.flight_robot import FlightRobot, GoalWatch
 from quad_nav.sim.flight import BodyState
+from quad_nav.sim.flight_law import planar_states
 from quad_nav.sim.robot_state import RobotStates
 
 PERIOD_S = 0.025

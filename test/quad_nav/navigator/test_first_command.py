@@ -12,7 +12,7 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.navigator.recovery_sequence import NamedRecovery
 from quad_nav.navigator.tick import Trigger
 
-FIXED = {"avoid_peers": False}
+FIXED = {"peers": {"avoid_peers": False}}
 STOP = Twist2D()
 OTHER_GOAL = Pose2D(5.0, 3.0, 0.0)
 
@@ -30,20 +30,20 @@ def first_motion_s(ticks):
 
 
 @pytest.mark.parametrize("rate_hz", [1.0, 10.0])
-@pytest.mark.parametrize("fixes, periods", [(UPSTREAM, 1), (FIXED, 0)])
+@pytest.mark.parametrize("tree, periods", [(UPSTREAM, 1), (FIXED, 0)])
 class TestFromGoalToMotion:
     """The plan comes in the cycle that takes the goal; the command so many periods later."""
 
-    def flight(self, rate_hz, fixes):
+    def flight(self, rate_hz, tree):
         return Flight(
             [NamedRecovery("none", FakeRecovery())],
-            fixes,
+            tree,
             controller_frequency_hz=rate_hz,
             planner_patience_s=1.0,
         )
 
-    def test_from_idle(self, rate_hz, fixes, periods):
-        flight = self.flight(rate_hz, fixes)
+    def test_from_idle(self, rate_hz, tree, periods):
+        flight = self.flight(rate_hz, tree)
         flight.until(0.3)
         taken_s = flight.now_s
         flight.navigator.set_goal(GOAL, taken_s)
@@ -52,8 +52,8 @@ class TestFromGoalToMotion:
         assert first_motion_s(ticks) - taken_s == pytest.approx(periods / rate_hz)
         assert [taken_s][:periods] == commands(ticks, STOP)
 
-    def test_over_an_active_goal(self, rate_hz, fixes, periods):
-        flight = self.flight(rate_hz, fixes)
+    def test_over_an_active_goal(self, rate_hz, tree, periods):
+        flight = self.flight(rate_hz, tree)
         flight.navigator.set_goal(GOAL, 0.0)
         flight.until(2.95)
         assert not flight.navigator.accepts_goal(2.95)
@@ -65,8 +65,8 @@ class TestFromGoalToMotion:
         assert first_motion_s(ticks) - taken_s == pytest.approx(periods / rate_hz)
         assert [] == commands(ticks, STOP)  # the command of the goal before goes on
 
-    def test_after_an_abort(self, rate_hz, fixes, periods):
-        flight = self.flight(rate_hz, fixes)
+    def test_after_an_abort(self, rate_hz, tree, periods):
+        flight = self.flight(rate_hz, tree)
         flight.planner.fails = True
         flight.navigator.set_goal(GOAL, 0.0)
         assert len(outcomes(flight.until(6.0))) == 1
@@ -78,10 +78,10 @@ class TestFromGoalToMotion:
         assert first_motion_s(ticks) - taken_s == pytest.approx(periods / rate_hz)
 
 
-@pytest.mark.parametrize("fixes, motion_s", [(UPSTREAM, 1.3), (FIXED, 1.2)])
-def test_after_a_recovery_that_takes_no_time(fixes, motion_s):
+@pytest.mark.parametrize("tree, motion_s", [(UPSTREAM, 1.3), (FIXED, 1.2)])
+def test_after_a_recovery_that_takes_no_time(tree, motion_s):
     """The search fails for more than 1 s at 1.1 s; the next cycle plans."""
-    flight = Flight([NamedRecovery("r", FakeRecovery())], fixes, planner_patience_s=1.0)
+    flight = Flight([NamedRecovery("r", FakeRecovery())], tree, planner_patience_s=1.0)
     flight.planner.fails = True
     flight.navigator.set_goal(GOAL, 0.0)
     ticks = flight.until(1.15)
@@ -105,10 +105,10 @@ def test_upstream_delays_its_cycles_by_a_rotation():
     assert [] == commands(ticks, STOP)
 
 
-@pytest.mark.parametrize("fixes, followed", [(UPSTREAM, [0, 1, 2]), (FIXED, [1, 2, 3])])
-def test_a_periodic_plan_is_followed_from_the_next_cycle_on(fixes, followed):
+@pytest.mark.parametrize("tree, followed", [(UPSTREAM, [0, 1, 2]), (FIXED, [1, 2, 3])])
+def test_a_periodic_plan_is_followed_from_the_next_cycle_on(tree, followed):
     """Planner and controller at 2 Hz: the plans that were followed after 0.1, 0.6 and 1.1 s."""
-    flight = Flight(fixes=fixes, controller_frequency_hz=2.0, planner_frequency_hz=2.0)
+    flight = Flight(tree=tree, controller_frequency_hz=2.0, planner_frequency_hz=2.0)
     flight.navigator.set_goal(GOAL, 0.0)
     counts = []
     for end_s in (0.1, 0.6, 1.1):
@@ -117,10 +117,10 @@ def test_a_periodic_plan_is_followed_from_the_next_cycle_on(fixes, followed):
     assert counts == followed
 
 
-@pytest.mark.parametrize("fixes, motion_s", [(UPSTREAM, 1.5), (FIXED, 1.5)])
-def test_a_plan_found_after_failures_is_followed_in_the_same_cycle(fixes, motion_s):
+@pytest.mark.parametrize("tree, motion_s", [(UPSTREAM, 1.5), (FIXED, 1.5)])
+def test_a_plan_found_after_failures_is_followed_in_the_same_cycle(tree, motion_s):
     """Upstream's thread repeats a failed search without a pause, so it ends before a cycle."""
-    flight = Flight(fixes=fixes)
+    flight = Flight(tree=tree)
     flight.planner.fails = True
     flight.navigator.set_goal(GOAL, 0.0)
     flight.until(1.45)
@@ -130,10 +130,10 @@ def test_a_plan_found_after_failures_is_followed_in_the_same_cycle(fixes, motion
     assert first_motion_s(ticks) == pytest.approx(motion_s)
 
 
-@pytest.mark.parametrize("fixes, searches_s", [(UPSTREAM, [1.0, 1.5]), (FIXED, [1.5])])
-def test_a_failed_command_is_followed_by_a_new_plan(fixes, searches_s):
+@pytest.mark.parametrize("tree, searches_s", [(UPSTREAM, [1.0, 1.5]), (FIXED, [1.5])])
+def test_a_failed_command_is_followed_by_a_new_plan(tree, searches_s):
     """One command is missing either way; upstream plans in the cycle that failed."""
-    flight = Flight(fixes=fixes, controller_frequency_hz=2.0)
+    flight = Flight(tree=tree, controller_frequency_hz=2.0)
     flight.navigator.set_goal(GOAL, 0.0)
     flight.until(0.95)
     flight.controller.fails = True
@@ -145,13 +145,13 @@ def test_a_failed_command_is_followed_by_a_new_plan(fixes, searches_s):
     assert [1.5] == commands(ticks)
 
 
-@pytest.mark.parametrize("fixes, recovers", [(UPSTREAM, False), (FIXED, True)])
-def test_a_plan_ends_upstreams_recovery_before_it_starts(fixes, recovers):
+@pytest.mark.parametrize("tree, recovers", [(UPSTREAM, False), (FIXED, True)])
+def test_a_plan_ends_upstreams_recovery_before_it_starts(tree, recovers):
     """The planner thread sets the state after every plan, also when control has failed."""
     recovery = FakeRecovery()
     flight = Flight(
         [NamedRecovery("r", recovery)],
-        fixes,
+        tree,
         controller_frequency_hz=1.0,
         planner_frequency_hz=2.0,
         controller_patience_s=1.5,
@@ -163,10 +163,10 @@ def test_a_plan_ends_upstreams_recovery_before_it_starts(fixes, recovers):
     assert outcomes(ticks) == ([(False, Trigger.CONTROLLING.value)] if recovers else [])
 
 
-@pytest.mark.parametrize("fixes, first_stop_s", [(UPSTREAM, 3.1), (FIXED, 2.0)])
-def test_a_new_goal_without_a_plan_over_an_active_one(fixes, first_stop_s):
+@pytest.mark.parametrize("tree, first_stop_s", [(UPSTREAM, 3.1), (FIXED, 2.0)])
+def test_a_new_goal_without_a_plan_over_an_active_one(tree, first_stop_s):
     """Upstream flies on for planner_patience with the last command of the goal before."""
-    flight = Flight(fixes=fixes, planner_patience_s=1.0, recovery_behavior_enabled=False)
+    flight = Flight(tree=tree, planner_patience_s=1.0, recovery_behavior_enabled=False)
     flight.navigator.set_goal(GOAL, 0.0)
     flight.until(1.95)
     flight.planner.fails = True
@@ -180,7 +180,7 @@ def test_a_new_goal_without_a_plan_over_an_active_one(fixes, first_stop_s):
 
 def test_the_order_changes_in_flight():
     """With a planner frequency: plans go on after the change, and so do commands."""
-    flight = Flight(fixes=FIXED, planner_frequency_hz=1.0)
+    flight = Flight(tree=FIXED, planner_frequency_hz=1.0)
     flight.navigator.set_goal(GOAL, 0.0)
     flight.until(1.5)
     for on, end_s in ((False, 4.5), (True, 7.5)):

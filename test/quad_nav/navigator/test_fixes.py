@@ -1,4 +1,4 @@
-"""Upstream bugs: fixed by default, and each can be restored."""
+"""Upstream bugs: fixed by default, and ``fixes/upstream`` restores them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.grid import LETHAL
 from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.tick import RobotPoses
-from quad_nav.peers.coordinator import PeerParams
+from quad_nav.peers.peer_params import PeerParams
 from quad_nav.recovery import RecoveryContext
 from quad_nav.scenario.assembly import apply_configuration, build_navigator
 
@@ -29,8 +29,8 @@ TREE = {
 HERE = Pose2D(5.0, 5.0)
 
 
-def navigator_with(fixes):
-    return build_navigator(load({**TREE, "fixes": fixes}))
+def navigator_with(tree):
+    return build_navigator(load({**TREE, **tree}))
 
 
 def see_a_wall_three_metres_ahead(navigator, now_s=0.0):
@@ -40,8 +40,8 @@ def see_a_wall_three_metres_ahead(navigator, now_s=0.0):
         costmap.update(now_s, HERE)
 
 
-def test_fixes_are_on_by_default_and_each_can_be_switched_off():
-    defaults, upstream = load({}), load({"fixes": UPSTREAM})
+def test_fixes_are_on_by_default_and_upstream_switches_all_off():
+    defaults, upstream = load({}), load(UPSTREAM)
     assert defaults.navigator.progress == ProgressParams(10.0, 0.1, 0.1)
     assert upstream.navigator.progress == ProgressParams(0.0, 0.1, 1.0)
     assert defaults.navigator.escape_collision and defaults.navigator.sensor_timeout_s == 1.0
@@ -52,11 +52,44 @@ def test_fixes_are_on_by_default_and_each_can_be_switched_off():
     assert not upstream.scan_validator.reject_implausible_scans
 
 
+def test_upstream_wins_over_the_parameters_of_deviations():
+    ours = {"sensor_timeout": 3.0, "peers": {"avoid_peers": True, "margin": 0.2}}
+    configuration = load({**ours, **UPSTREAM})
+    assert configuration.navigator.sensor_timeout_s == 0.0
+    assert not configuration.peers.avoid_peers and configuration.peers.margin_m == 0.2
+    configuration = updated(configuration, "fixes", {"upstream": False})
+    assert configuration.navigator == load(ours).navigator
+    assert configuration.peers == load(ours).peers
+
+
+def test_upstream_keeps_the_patience_of_the_first_reconfiguration():
+    """move_base has its own value until it is reconfigured itself."""
+    configuration = updated(load({}), "fixes", {"upstream": True})
+    assert configuration.navigator.controller_patience_s == 15.0
+    configuration = updated(configuration, "", {"planner_patience": 4.0})
+    configuration = updated(configuration, "fixes", {"upstream": False})
+    assert configuration.navigator.controller_patience_s == 5.0
+
+
 @pytest.mark.parametrize(
-    "fixes, is_left", [({}, False), ({"clear_any_obstacle_layer": False}, True)]
+    "old, new",
+    [
+        ("avoid_peers", "peers/avoid_peers"),
+        ("peer_margin", "peers/margin"),
+        ("progress_timeout", "progress_timeout"),
+        ("sensor_timeout", "sensor_timeout"),
+        ("respect_meter_scoring", "TrajectoryPlannerROS/respect_meter_scoring"),
+        ("stop_after_rotation", "fixes/upstream"),
+    ],
 )
-def test_the_default_recovery_clears_any_obstacle_layer(fixes, is_left):
-    navigator = navigator_with(fixes)
+def test_an_old_name_is_remarked_on_with_the_new_one(old, new):
+    (remark,) = [one for one in load({"fixes": {old: False}}).remarks if "fixes" in one.place]
+    assert str(remark) == f"/fixes/{old}: nothing reads it here; did you mean {new}?"
+
+
+@pytest.mark.parametrize("tree, is_left", [({}, False), (UPSTREAM, True)])
+def test_the_default_recovery_clears_any_obstacle_layer(tree, is_left):
+    navigator = navigator_with(tree)
     see_a_wall_three_metres_ahead(navigator)
     grid = navigator.global_costmap.layers["obstacle_layer"].grid.costs
     assert (grid == LETHAL).any()
@@ -66,38 +99,36 @@ def test_the_default_recovery_clears_any_obstacle_layer(fixes, is_left):
 
 
 @pytest.mark.parametrize(
-    "fixes, stale_after_s",
+    "tree, stale_after_s",
     [({}, 1.0), ({"sensor_timeout": 0.0}, 21.0), ({"sensor_timeout": 3.0}, 3.0)],
 )
-def test_sensor_timeout_limits_the_expected_update_rate(fixes, stale_after_s):
-    navigator = navigator_with(fixes)
+def test_sensor_timeout_limits_the_expected_update_rate(tree, stale_after_s):
+    navigator = navigator_with(tree)
     see_a_wall_three_metres_ahead(navigator, 10.0)
     assert navigator.local_costmap.is_current(10.0 + stale_after_s)
     assert not navigator.local_costmap.is_current(10.1 + stale_after_s)
 
 
-@pytest.mark.parametrize("fixes", [{}, UPSTREAM])
-def test_switches_reach_planner_and_recoveries(fixes):
-    navigator = navigator_with(fixes)
-    on = not fixes
+@pytest.mark.parametrize("tree", [{}, UPSTREAM])
+def test_deviations_reach_planner_and_recoveries(tree):
+    navigator = navigator_with(tree)
+    on = not tree
     assert navigator.controller.params.reject_colliding_escape is on
     assert navigator.controller.params.end_blocked_escape is on
     assert navigator.controller.params.predict_goal_turn is on
     assert navigator.recoveries[1].behaviour.params.stop_after_rotation is on
-    dwa = build_navigator(
-        load({"fixes": fixes, "base_local_planner": "dwa_local_planner/DWAPlannerROS"})
-    )
+    dwa = build_navigator(load({**tree, "base_local_planner": "dwa_local_planner/DWAPlannerROS"}))
     assert dwa.controller.params.predict_goal_turn is on
 
 
-def test_fixes_can_be_switched_in_flight():
+def test_groups_can_be_changed_in_flight():
     configuration = load(TREE)
     navigator = build_navigator(configuration)
-    configuration = updated(
-        configuration, "fixes", {"progress_timeout": 3.0, "predict_goal_turn": False}
-    )
+    configuration = updated(configuration, "", {"progress_timeout": 3.0})
     apply_configuration(navigator, configuration)
     assert navigator.params.progress.timeout_s == 3.0
+    apply_configuration(navigator, updated(configuration, "fixes", {"upstream": True}))
+    assert navigator.params.progress.timeout_s == 0.0
     assert not navigator.controller.params.predict_goal_turn
 
 
@@ -106,7 +137,7 @@ def test_fixes_can_be_switched_in_flight():
     [("TrajectoryPlannerROS", {"sim_time": 1.0}), ("", {"controller_frequency": 5.0})],
 )
 def test_reconfiguring_another_namespace_keeps_the_fixes(namespace, changes):
-    before = load({"fixes": UPSTREAM})
+    before = load(UPSTREAM)
     after = updated(before, namespace, changes)
     assert after != before
     assert not after.local_planner.reject_colliding_escape
@@ -117,16 +148,16 @@ def test_reconfiguring_another_namespace_keeps_the_fixes(namespace, changes):
 
 
 def test_switching_fixes_in_flight_changes_every_owner_but_the_recoveries():
-    upstream = load({"fixes": UPSTREAM})
-    switched = updated(load({}), "fixes", UPSTREAM)
+    upstream = load(UPSTREAM)
+    switched = updated(load({}), "fixes", UPSTREAM["fixes"])
     assert switched.navigator == upstream.navigator
     assert switched.local_planner == upstream.local_planner
     assert (switched.peers, switched.scan_validator) == (upstream.peers, upstream.scan_validator)
     assert switched.recoveries == load({}).recoveries != upstream.recoveries
 
 
-@pytest.mark.parametrize("fixes, leaves", [({}, True), ({"escape_collision": False}, False)])
-def test_a_robot_in_collision_escapes(fixes, leaves):
+@pytest.mark.parametrize("own, leaves", [({}, True), ({"escape_collision": False}, False)])
+def test_a_robot_in_collision_escapes(own, leaves):
     """Its back is 0.36 m behind it, in the cell of the wall at 0.38 m."""
     away = Pose2D(5.0, 5.0, 3.14)
     node = {
@@ -142,7 +173,7 @@ def test_a_robot_in_collision_escapes(fixes, leaves):
             {
                 "global_costmap": node,
                 "local_costmap": {**node, "rolling_window": True, "width": 4.0, "height": 4.0},
-                "fixes": fixes,
+                **own,
             }
         )
     )

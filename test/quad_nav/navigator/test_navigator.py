@@ -9,9 +9,11 @@ import pytest
 from upstream import UPSTREAM
 
 from quad_nav.config import load
+from quad_nav.costmap.tracks import Tracks
 from quad_nav.errors import NoPath, NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
+from quad_nav.navigator.command_filter import VoronoiCell
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
 from quad_nav.navigator.tick import RobotPoses, State, Trigger
@@ -19,7 +21,6 @@ from quad_nav.peers.coordinator import PeerCoordinator
 from quad_nav.plan.planner import ring_offsets
 from quad_nav.recovery import Step
 from quad_nav.timing import Schedule
-from quad_nav.tracking.tracks import Tracks
 
 HERE = Pose2D(1.0, 1.0, 0.0)
 GOAL = Pose2D(5.0, 1.0, 0.0)
@@ -108,15 +109,18 @@ class FakeRecovery:
         return Step(command=Twist2D(vyaw_radps=1.0), done=self.left == 0)
 
 
+ALONE = {"peers": {"avoid_peers": False}}
+
+
 class Flight:
     """A navigator, its fakes, and a clock that stops wherever something is due.
 
-    It behaves as upstream, or with the group ``fixes`` that is given.
+    It behaves as upstream, or with the parameters of the tree that is given.
     """
 
-    def __init__(self, recoveries=(), fixes=None, **params):
+    def __init__(self, recoveries=(), tree=UPSTREAM, filters=None, **params):
         params.setdefault("controller_frequency_hz", 10.0)
-        configuration = load({"fixes": UPSTREAM if fixes is None else fixes})
+        configuration = load(tree)
         self.global_costmap = FakeCostmap(5.0)
         self.local_costmap = FakeCostmap(4.0)
         self.planner, self.controller = FakePlanner(), FakeController()
@@ -128,6 +132,7 @@ class Flight:
             self.controller,
             recoveries,
             PeerCoordinator(configuration.peers, self.global_costmap, self.local_costmap),
+            [VoronoiCell()] if filters is None else filters,
         )
         self.now_s = 0.0
         self.pose = HERE
@@ -152,7 +157,7 @@ def test_costmaps_are_updated_at_their_own_frequencies():
 
 
 def test_a_goal_is_planned_once_and_commanded_in_every_cycle():
-    flight = Flight(fixes={}, controller_frequency_hz=2.0)
+    flight = Flight(tree={}, controller_frequency_hz=2.0)
     flight.navigator.set_goal(GOAL, 0.0)
     ticks = flight.until(2.0)
     assert flight.planner.calls == 1
@@ -236,7 +241,7 @@ def test_a_robot_without_progress_replans_then_recovers_then_aborts():
 
 
 def test_a_robot_without_progress_relaxes_the_obstacle_weight_until_it_has_moved():
-    flight = Flight(fixes={"progress_timeout": 2.0})
+    flight = Flight(tree={"progress_timeout": 2.0})
     weights = flight.controller
     weights.params = Weights(occdist_scale=0.01)
     flight.navigator.set_goal(GOAL, 0.0)
@@ -302,10 +307,10 @@ def test_a_sensor_timeout_stops_the_robot_and_names_the_sensor():
     assert FORWARD in {tick.command for tick in flight.until(2.0)}
 
 
-@pytest.mark.parametrize("fixes, turns", [({"avoid_peers": False}, False), (UPSTREAM, True)])
-def test_a_rotation_pauses_without_sensor_data(fixes, turns):
+@pytest.mark.parametrize("tree, turns", [(ALONE, False), (UPSTREAM, True)])
+def test_a_rotation_pauses_without_sensor_data(tree, turns):
     recovery = FakeRecovery(steps=200)
-    flight = Flight([NamedRecovery("rotate", recovery)], fixes, planner_patience_s=0.5)
+    flight = Flight([NamedRecovery("rotate", recovery)], tree, planner_patience_s=0.5)
     flight.planner.fails = True
     flight.navigator.set_goal(GOAL, 0.0)
     flight.until(2.0)
@@ -318,7 +323,7 @@ def test_a_rotation_pauses_without_sensor_data(fixes, turns):
 
 
 def test_a_robot_that_stops_without_sensor_data_keeps_its_patience():
-    flight = Flight(fixes={"progress_timeout": 1.0, "avoid_peers": False})
+    flight = Flight(tree={"progress_timeout": 1.0, **ALONE})
     flight.navigator.set_goal(GOAL, 0.0)
     flight.local_costmap.stale = [("obstacle_layer/base_scan", 1.26)]
     flight.until(5.0)
@@ -382,9 +387,9 @@ def test_a_changed_frequency_takes_effect_at_once():
     assert len(flight.global_costmap.updates) - before >= 16
 
 
-def test_tracks_without_avoidance_change_no_command():
+def test_tracks_without_a_filter_change_no_command():
     tracks = Tracks(
-        0.0, np.array([0]), np.array([[1.5, 1.0, -1.0, 0.0]]), np.zeros((1, 4, 4)), [0.5]
+        0.0, np.array([0]), np.array([[1.5, 1.0, -1.0, 0.0]]), np.zeros((1, 4, 4)), [0.5], [0.0]
     )
     flight = Flight()
     flight.navigator.set_goal(GOAL, 0.0)

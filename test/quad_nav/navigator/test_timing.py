@@ -99,7 +99,7 @@ def test_a_frequency_of_zero_is_never_due():
 @pytest.mark.parametrize("first", [3, 6, 9, 2424])
 def test_a_navigator_of_any_clock_searches_and_commands_once_in_each_period(clock, first):
     """With a clock of 240 Hz. A search that fails is repeated in each control cycle."""
-    flight = Flight(fixes={}, controller_frequency_hz=1.0, planner_patience_s=100.0)
+    flight = Flight(tree={}, controller_frequency_hz=1.0, planner_patience_s=100.0)
     flight.planner.fails, here = True, RobotPoses(HERE, HERE)
     times_s = [clock((first + k) / 240) for k in range(240 * 18)]
     flight.navigator.set_goal(GOAL, times_s[0])

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from quad_nav.costmap.cost_grid import NOWHERE, CostGrid
+from quad_nav.costmap.cost_grid_kernel import nearest_cell, raise_discs
 from quad_nav.costmap.peer_layer import PeerArea, PeerLayer
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
-from quad_nav.kernels.peers import nearest_cell, raise_discs
 from quad_nav.peers.holding_point import COMFORTABLE, find_holding_point, is_reachable
 
 MIN_SEPARATION_M = 0.9

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.kernels.peers import nearest_in_time
 from quad_nav.peers.peer import (
     HIGHEST_PRIORITY,
     IDLE_PRIORITY,
@@ -21,6 +20,7 @@ from quad_nav.peers.peer import (
     resample,
 )
 from quad_nav.peers.peer_costs import places_met
+from quad_nav.peers.predicted_paths import nearest_in_time
 from quad_nav.peers.right_of_way import (
     Yield,
     YieldDecision,

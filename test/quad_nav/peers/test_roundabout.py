@@ -182,7 +182,7 @@ def test_members_do_not_yield_and_their_paths_cost_nothing(navigator):
     areas = coordinator._costs._areas(np.array([(p.x_m, p.y_m) for p in first]), START, -1.0)
     assert [(len(area.points), area.cost) for area in areas] == [(4, 100)]
 
-    off = updated(load({**TREE, "robot": 0}), "fixes", {"roundabouts": False})
+    off = updated(load({**TREE, "robot": 0}), "peers", {"roundabouts": False})
     apply_configuration(navigator, off)
     coordinator.observe(0.1, START, in_frame, [p.extrapolated(0.1) for p in first], 0.3)
     assert coordinator.decide(0.1, START, GOAL).messages != ()

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from quad_nav.config import load
+from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL
 from quad_nav.peers.peer import Peer
 from quad_nav.peers.right_of_way import STRANGER, Yield
 from quad_nav.peers.stand_off import StandOff
 from quad_nav.scenario.assembly import build_navigator
-from quad_nav.tracking.tracks import Tracks
 
 TREE = {
     "global_costmap": {"width": 10.0, "height": 10.0, "robot_radius": 0.35, "resolution": 0.1},
@@ -141,7 +141,7 @@ def test_the_switch_is_off_by_default() -> None:
     peers = build_navigator(load({**TREE, "robot": 0})).peers
     assert not peers.params.yield_to_strangers
     on = build_navigator(
-        load({**TREE, "robot": 0, "fixes": {"yield_to_strangers": True, "stranger_patience": 2.5}})
+        load({**TREE, "robot": 0, "peers": {"yield_to_strangers": True, "stranger_patience": 2.5}})
     ).peers
     assert on.params.yield_to_strangers
     assert math.isclose(on.params.stranger_patience_s, 2.5)

@@ -46,8 +46,8 @@ TREE = {
 class Fleet:
     """Navigators that are peers of each other, and their bodies."""
 
-    def __init__(self, *poses, fixes=None):
-        tree = {**TREE, "fixes": fixes or {}}
+    def __init__(self, *poses, peers=None):
+        tree = {**TREE, "peers": peers or {}}
         self.navigators = [build_navigator(load({**tree, "robot": k})) for k in range(len(poses))]
         self.poses = list(poses)
         self.velocities = [Twist2D()] * len(poses)
@@ -106,7 +106,7 @@ def test_head_on_one_robot_goes_straight_and_the_other_passes_beside_it():
 
 
 def test_without_avoid_peers_they_do_not_avoid_each_other():
-    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(8.0, 5.0, math.pi), fixes={"avoid_peers": False})
+    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(8.0, 5.0, math.pi), peers={"avoid_peers": False})
     fleet.navigators[0].set_goal(Pose2D(8.0, 5.0), 0.0)
     fleet.navigators[1].set_goal(Pose2D(2.0, 5.0), 0.0)
     fleet.fly(20.0)
@@ -119,7 +119,7 @@ def test_avoid_peers_can_be_switched_off_in_flight():
     fleet.navigators[0].set_goal(Pose2D(8.0, 5.0), 0.0)
     fleet.fly(1.0)
     assert len(fleet.navigators[0].peers.peers) == 1
-    off = updated(load({**TREE, "robot": 0}), "fixes", {"avoid_peers": False})
+    off = updated(load({**TREE, "robot": 0}), "peers", {"avoid_peers": False})
     apply_configuration(fleet.navigators[0], off)
     fleet.fly(0.5)
     assert fleet.navigators[0].peers.peers == []
@@ -140,7 +140,7 @@ def test_an_idle_robot_on_a_goal_makes_room_and_returns():
 
 
 def test_without_yield_when_idle_an_idle_robot_stays():
-    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(6.0, 5.0), fixes={"yield_when_idle": False})
+    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(6.0, 5.0), peers={"yield_when_idle": False})
     fleet.navigators[0].set_goal(Pose2D(6.0, 5.0), 0.0)
     fleet.fly(25.0)
     assert fleet.poses[1] == Pose2D(6.0, 5.0)
@@ -270,7 +270,7 @@ def test_a_stationary_peer_is_an_obstacle_whatever_its_intention():
 
 def test_an_idle_robot_makes_room_for_a_peer_that_it_blocks():
     """The goal is 0.71 m from the parked robot; a robot that stands for long counts as parked."""
-    fleet = Fleet(Pose2D(5.0, 5.0), Pose2D(4.72, 6.2, -1.0), fixes={"yield_when_idle": False})
+    fleet = Fleet(Pose2D(5.0, 5.0), Pose2D(4.72, 6.2, -1.0), peers={"yield_when_idle": False})
     fleet.navigators[1].set_goal(Pose2D(5.5, 5.5), 0.0)
     fleet.fly(12.0)
     assert fleet.outcomes[1] == [] and fleet.poses[1].distance_to(Pose2D(4.72, 6.2)) < 0.5

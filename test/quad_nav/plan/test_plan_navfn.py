@@ -9,7 +9,8 @@ from costmap_maps import costs_of
 from quad_nav.errors import GoalOutsideMap, NoPath, StartOutsideMap
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, INSCRIBED, LETHAL, UNKNOWN, GridSpec
-from quad_nav.kernels.wave import (
+from quad_nav.plan.navfn import Navfn, NavfnParams, navigation_costs, path_from, potential_from
+from quad_nav.plan.wavefront_kernel import (
     NOT_REACHED,
     WaveParams,
     arrival_at,
@@ -18,7 +19,6 @@ from quad_nav.kernels.wave import (
     push,
     start_at_cell,
 )
-from quad_nav.plan.navfn import Navfn, NavfnParams, navigation_costs, path_from, potential_from
 
 CORRIDOR = """
     #######

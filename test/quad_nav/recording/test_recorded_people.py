@@ -17,9 +17,10 @@ from quad_nav.recording.recorder import Recorder
 from quad_nav.recording.trace import TraceObserver
 from quad_nav.report.encounter_picture import encounter_picture
 from quad_nav.report.encounters import encounters
+from quad_nav.report.matplotlib_figures import paths_picture
 from quad_nav.report.measures import clearances_m, resampled_tracks
-from quad_nav.report.paths_picture import paths_picture
-from quad_nav.report.paths_plot import paths_plot
+from quad_nav.report.paths import flown_paths
+from quad_nav.report.plotly_figures import paths_plot
 from quad_nav.scenario import mission_setup
 from quad_nav.scenario.rules import START_S
 from quad_nav.sim.contacts import Contact
@@ -69,11 +70,11 @@ def test_a_record_without_places_and_one_that_forgets():
     assert np.isnan(places_of(record, 0.05)).all() and places_of(record, 0.15) == [[[0.0, 0.0]]]
 
 
-@pytest.fixture(scope="module", params=["flight.bag", "flight.mcap"])
-def flown(request, tmp_path_factory):
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
     """The summary of a flight among people who react, its trace and the one that was recorded."""
     folder = tmp_path_factory.mktemp("people")
-    path = folder / request.param
+    path = folder / "flight.bag"
     given = setup(folder, seed=2, time_limit_s=6.0)
     given = replace(given, scene=replace(given.scene, walkers=PEOPLE))
     observer = TraceObserver()
@@ -99,10 +100,10 @@ def test_pictures_and_pages_have_them(flown):
     last_s = float(tracks.times_s[-1])
     people = trace.movers.poses(last_s)[:, :2]
     assert np.isfinite(people).all()
-    drawn = paths_picture(trace, tracks, []).axes[0].patches
+    drawn = paths_picture(flown_paths(trace, tracks, [])).axes[0].patches
     circles = np.array([one.center for one in drawn if isinstance(one, Circle)])
     assert all(np.hypot(*(circles - person).T).min() < 1e-9 for person in people)
-    plot = paths_plot(trace, tracks, [])
+    plot = paths_plot(flown_paths(trace, tracks, []))
     (shown,) = (one for one in plot.traces if one.get("name") == "moving obstacle")
     number = list(plot.traces).index(shown)
     for frame in plot.frames:
@@ -155,7 +156,7 @@ def test_people_of_whom_nothing_is_recorded_are_left_out():
     trace = flight(robot(0, (1.0, 1.0)), scene=replace(SCENE, walkers=PEOPLE))
     tracks = resampled_tracks(trace)
     assert np.isfinite(clearances_m(tracks, trace)).all()
-    assert paths_plot(trace, tracks, []).frames[-1]["data"][0] == {"x": [], "y": []}
+    assert paths_plot(flown_paths(trace, tracks, [])).frames[-1]["data"][0] == {"x": [], "y": []}
 
 
 def test_an_animation_among_many_people_has_fewer_corners():
@@ -164,6 +165,6 @@ def test_an_animation_among_many_people_has_fewer_corners():
         record.add(time_s, np.column_stack([np.linspace(1.0, 11.0, 100), np.full(100, time_s)]))
     scene = replace(SCENE, walkers=replace(PEOPLE, count=100))
     trace = flight(robot(0, (1.0, 1.0)), scene=scene, people=record)
-    plot = paths_plot(trace, resampled_tracks(trace), [])
+    plot = paths_plot(flown_paths(trace, resampled_tracks(trace), []))
     outlines = plot.frames[50]["data"][0]
     assert len(outlines["x"]) == 100 * (6 + 1 + 1) - 1  # a hexagon, its closing corner and a gap

@@ -166,7 +166,7 @@ def test_a_second_run_begins_the_distance_anew_and_restores_the_first_values():
     ],
 )
 def test_the_parameters_that_upstream_sets(own, named):
-    ((_, params),) = load({**TREE, "slow": own, "fixes": UPSTREAM}, "").recoveries
+    ((_, params),) = load({**TREE, "slow": own, **UPSTREAM}, "").recoveries
     assert (params.named_translation_field, params.named_rotation_field) == named
     fields = [field for field, _ in params.limit.greatest]
     assert fields == [field for field in named if field]
@@ -179,7 +179,7 @@ def test_an_idle_robot_that_is_moved_gets_its_speed_back():
         "max_trans_param_name": "max_vel_x",
         "max_rot_param_name": "max_vel_theta",
     }
-    stuck = Stuck({**TREE, "slow": slow, "fixes": UPSTREAM})
+    stuck = Stuck({**TREE, "slow": slow, **UPSTREAM})
     assert stuck.max_vel_x_mps == 0.25
     stuck.navigator.cancel()
     stuck.fly(HERE, 0.3)

@@ -10,8 +10,9 @@ from hand_made_traces import TIMES_S, flight, robot
 
 from quad_nav.report.encounter_picture import encounter_picture, frame_times
 from quad_nav.report.encounters import encounters, separation_text
+from quad_nav.report.matplotlib_figures import paths_picture
 from quad_nav.report.measures import resampled_tracks
-from quad_nav.report.paths_picture import paths_picture
+from quad_nav.report.paths import flown_paths
 from quad_nav.report.style import styled
 from quad_nav.sim.contacts import Contact
 
@@ -89,7 +90,7 @@ def test_the_legend_of_paths_shows_the_letter():
     trace = passing(1.0)
     tracks = resampled_tracks(trace)
     with styled():
-        (legend,) = paths_picture(trace, tracks, encounters(trace, tracks)).legends
+        (legend,) = paths_picture(flown_paths(trace, tracks, encounters(trace, tracks))).legends
         names = [text.get_text() for text in legend.get_texts()]
         letter = legend.legend_handles[names.index("close encounter")].get_marker()
     width, height = np.ptp(letter.vertices, axis=0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from test_peer_topics import host, joined, states, wall  # noqa: E402, F401
 from test_stopped_clock import scan_stamped, sensor_with  # noqa: E402
 from tf2_msgs.msg import TFMessage  # noqa: E402
 
+from quad_nav.costmap.tracks import Tracks  # noqa: E402
 from quad_nav.geometry import Pose3D  # noqa: E402
 from quad_nav.ros.common import conversions  # noqa: E402
 from quad_nav.ros.common.packed_messages import STATES_TOPIC, states_message  # noqa: E402
@@ -22,8 +24,6 @@ from quad_nav.ros.common.transforms import Transforms  # noqa: E402
 from quad_nav.ros.navigator.obstacle_topics import ObstacleTopics  # noqa: E402
 from quad_nav.ros.sequencer.odometry import OdometryIntake  # noqa: E402
 from quad_nav.topics.publishing import in_fleet  # noqa: E402
-from quad_nav.tracking.tracker import ObstacleTracker  # noqa: E402
-from quad_nav.tracking.tracks import TrackerParams, Tracks  # noqa: E402
 
 LIDAR = Pose3D(1.0, 2.0, 0.3)
 MANY = np.random.default_rng(0).integers(10**9, 10**14, 200).tolist()  # up to 28 hours
@@ -153,12 +153,11 @@ def test_the_sequencer_finds_a_robot_where_its_frame_was_at_the_stamp(ros, stamp
 
 @pytest.mark.parametrize("stamp_ns", STAMPS_NS[:4])
 def test_a_cloud_of_obstacles_has_the_stamp_of_their_scan(ros, stamp_ns):
-    tracker = ObstacleTracker(TrackerParams(True), "map")
-    topics = ObstacleTopics(tracker, in_fleet(0))
     stamp_s = time_of(stamp_ns).to_sec()
-    states = np.array([[1.0, 0.0, 1.0, 0.0]])
-    tracker.tracks = Tracks(stamp_s, np.array([1]), states, np.eye(4)[np.newaxis], np.array([0.3]))
-    tracker.unseen_s = np.zeros(1)
+    states, one = np.array([[1.0, 0.0, 1.0, 0.0]]), np.array([1])
+    tracks = Tracks(stamp_s, one, states, np.eye(4)[np.newaxis], np.array([0.3]), np.zeros(1))
+    filters = SimpleNamespace(tracks=lambda now_s: tracks)
+    topics = ObstacleTopics(filters, "map", in_fleet(0))
     topics.publish(stamp_s)
     (cloud,) = [
         one.last for name, one in FakePublisher.all.items() if name.endswith("obstacles_cloud")

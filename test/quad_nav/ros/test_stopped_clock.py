@@ -14,12 +14,12 @@ from sensor_msgs.msg import LaserScan  # noqa: E402
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap  # noqa: E402
 from quad_nav.costmap.observation import SourceParams  # noqa: E402
 from quad_nav.costmap.obstacle import ObstacleLayerParams  # noqa: E402
+from quad_nav.costmap.scan_filter import ScanFilters  # noqa: E402
 from quad_nav.costmap.scan_intake import sinks_of  # noqa: E402
-from quad_nav.costmap.scan_validator import ScanValidatorParams  # noqa: E402
+from quad_nav.costmap.scan_validator import ScanValidator, ScanValidatorParams  # noqa: E402
 from quad_nav.ros.navigator import loop  # noqa: E402
 from quad_nav.ros.navigator.loop import NavigatorLoop, StallDetector  # noqa: E402
 from quad_nav.ros.navigator.sensors import Sensor  # noqa: E402
-from quad_nav.tracking.tracker import ObstacleTracker, TrackerParams  # noqa: E402
 
 
 @pytest.fixture
@@ -62,8 +62,8 @@ def sensor_with(**params):
         "/scan0",
         "LaserScan",
         sinks_of([costmap]),
-        ScanValidatorParams(**params),
-        ObstacleTracker(TrackerParams(), "map"),
+        ScanFilters([ScanValidator(ScanValidatorParams(**params))]),
+        "map",
     )
 
 

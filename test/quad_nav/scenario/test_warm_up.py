@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import ast
-import importlib
 import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Dict, Set
+from types import ModuleType
+from typing import Any, Dict, Iterator
 
+import numba
 import pytest
-from numba.core.dispatcher import Dispatcher
 
 from quad_nav.config import load
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.voxel import VoxelLayer
-from quad_nav.kernels import jit
-from quad_nav.kernels.numba_cache import compiled_overloads
+from quad_nav.files import kernel_cache
 from quad_nav.plan.global_planner import SearchPlanner
 from quad_nav.scenario import warm_up
 from quad_nav.scenario.assembly import GLOBAL_PLANNERS, LOCAL_PLANNERS
@@ -89,58 +88,49 @@ def test_any_configuration_can_be_warmed_up():
 
 
 def test_every_kernel_that_python_calls_is_compiled():
-    """A kernel that is compiled in flight, or for which numba is imported, stops the robot."""
-    if jit._IS_DISABLED:
-        pytest.skip("nothing is compiled")
+    """A kernel that is compiled in flight stops the robot."""
+    if numba.config.DISABLE_JIT or kernel_cache.FOLDER is None:
+        pytest.skip("nothing is compiled, or nothing is kept")
     warm_up.fly_missions()
-    assert {name for name, kernel in kernels_called_in_python().items() if is_cold(kernel)} == set()
+    called = kernels_called_in_python()
+    assert len(called) > 50
+    assert sorted(name for name, kernel in called.items() if not is_compiled(kernel)) == []
 
 
-def is_cold(kernel: object) -> bool:
-    """True for a kernel that neither the library holds nor numba has compiled."""
-    if isinstance(kernel, jit._LazyKernel):
-        kernel = vars(kernel).get("_kernel")  # made at the first call
-    return kernel is None or (isinstance(kernel, Dispatcher) and not compiled_overloads(kernel))
+def is_compiled(kernel: Any) -> bool:
+    """True for a kernel that is compiled in this process, or cached as a part of another one."""
+    source = Path(kernel.py_func.__code__.co_filename)
+    folder = kernel_cache.FOLDER / kernel_cache.folder_name(source)
+    cached = folder.glob(f"*/{source.stem}.{kernel.__name__}-*.nbi")
+    return bool(kernel.signatures) or any(cached)
 
 
-def kernels_called_in_python() -> Dict[str, object]:
-    """The kernels that modules outside of ``kernels/`` call."""
-    package = Path(jit.__file__).parents[1]
-    kernels = {}
-    for path in (package / "kernels").glob("*.py"):
-        module = importlib.import_module(f"quad_nav.kernels.{path.stem}")
-        for name, value in vars(module).items():
-            if getattr(getattr(value, "py_func", None), "__module__", "") == module.__name__:
-                kernels[path.stem, name] = value
+def kernels_called_in_python() -> Dict[str, Any]:
+    """The kernels that code calls which is no kernel, by their names."""
     found = {}
-    for path in package.rglob("*.py"):
-        if path.parent.name != "kernels":
-            names = called_names(path)
-            found.update(
-                {
-                    f"{stem}.{name}": kernel
-                    for (stem, name), kernel in kernels.items()
-                    if (stem, name) in names
-                }
-            )
+    for name, module in sorted(sys.modules.items()):
+        if name.startswith("quad_nav.") and getattr(module, "__file__", None):
+            for used in used_outside_kernels(ast.parse(Path(module.__file__).read_text()), module):
+                if hasattr(used, "signatures"):
+                    found[f"{used.__module__}.{used.__name__}"] = used
     return found
 
 
-def called_names(path: Path) -> Set[object]:
-    """(module of ``kernels``, name) of everything that a module may call there."""
-    tree = ast.parse(path.read_text())
-    modules, names = {}, set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.module == "quad_nav.kernels":
-            modules.update({one.asname or one.name: one.name for one in node.names})
-        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith(
-            "quad_nav.kernels."
-        ):
-            names.update((str(node.module).rsplit(".", 1)[1], one.name) for one in node.names)
-            modules.update({one.asname or one.name: one.name for one in node.names})
-        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-            names.add((modules.get(node.value.id), node.attr))
-    return names
+def used_outside_kernels(node: ast.AST, module: ModuleType) -> Iterator[object]:
+    """Yield what a module names outside of its kernels."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.FunctionDef):
+            if any("njit" in ast.dump(decorator) for decorator in child.decorator_list):
+                continue
+            for statement in ast.walk(child):  # an import in a function
+                if isinstance(statement, ast.ImportFrom) and statement.module in sys.modules:
+                    for alias in statement.names:
+                        yield getattr(sys.modules[statement.module], alias.name, None)
+        elif isinstance(child, ast.Name):
+            yield getattr(module, child.id, None)
+        elif isinstance(child, ast.Attribute) and isinstance(child.value, ast.Name):
+            yield getattr(getattr(module, child.value.id, None), child.attr, None)
+        yield from used_outside_kernels(child, module)
 
 
 def test_lidars_scan_in_each_scene(monkeypatch):
@@ -151,17 +141,22 @@ def test_lidars_scan_in_each_scene(monkeypatch):
 
 
 TYPES_OF_A_FLIGHT = """
+import sys
 from dataclasses import replace
 
-from quad_nav.kernels import jit
 from quad_nav.offline.run import fly
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.scenario.warm_up import fly_missions
 
 
 def compiled():
-    kernels = jit.numba_kernels()
-    return {(kernel.__name__, types) for kernel in kernels for types in kernel.overloads}
+    modules = [module for name, module in sys.modules.items() if name.startswith("quad_nav.")]
+    kernels = [one for module in modules for one in vars(module).values()]
+    return {
+        (kernel.__name__, types)
+        for kernel in kernels
+        for types in getattr(kernel, "signatures", ())
+    }
 
 
 fly_missions()
@@ -175,10 +170,10 @@ print(sorted(map(str, compiled() - warm)))
 
 
 def test_a_flight_calls_no_kernel_with_types_that_the_warm_up_does_not():
-    """A type that is missing in the library of kernels makes each node load numba."""
+    """A type that is missing is compiled in flight, which stops the robot."""
     run = subprocess.run(
         [sys.executable, "-c", TYPES_OF_A_FLIGHT],
-        env={**os.environ, "QUAD_KERNELS": "numba", "PYTHONPATH": os.pathsep.join(sys.path)},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
         stdout=subprocess.PIPE,
         check=True,
         text=True,

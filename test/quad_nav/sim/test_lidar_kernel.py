@@ -12,12 +12,12 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Twist2D, quaternion_from_euler
-from quad_nav.kernels.lidar import Beams, SolidGrid, Solids, cast_scans
-from quad_nav.kernels.rays import BOX, CYLINDER, SPHERE
 from quad_nav.sim.body import World
 from quad_nav.sim.casters import KernelCaster, WorldCaster
 from quad_nav.sim.flight import Airframe, BodyState
 from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.lidar_kernel import Beams, SolidGrid, Solids, cast_scans
+from quad_nav.sim.rays import BOX, CYLINDER, SPHERE
 from quad_nav.sim.scene import Box, Cylinder, Scene, Walls
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.sim.simulation import Simulation

@@ -14,8 +14,9 @@ from quad_nav.recording.bag_file import read_messages
 from quad_nav.recording.bag_trace import read_trace
 from quad_nav.recording.recorder import Recorder
 from quad_nav.report.animation import animate_flight
+from quad_nav.report.matplotlib_figures import paths_picture
 from quad_nav.report.measures import clearances_m, resampled_tracks
-from quad_nav.report.paths_picture import paths_picture
+from quad_nav.report.paths import flown_paths
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.motion import SPLINE, Motion
@@ -165,7 +166,7 @@ def test_recordings_have_the_obstacles_and_reports_show_them(tmp_path):
         x_m, y_m, _ = movers.poses(0.1 * k)[0]
         position = sent[k].content.markers[0].pose.position
         assert (position.x, position.y) == pytest.approx((x_m, y_m))
-    figure = paths_picture(trace, resampled_tracks(trace), [])
+    figure = paths_picture(flown_paths(trace, resampled_tracks(trace), []))
     drawn = [patch.center for patch in figure.axes[0].patches if isinstance(patch, Circle)]
     assert any(at == pytest.approx(movers.poses(2.0)[0, :2]) for at in drawn)
     animate_flight(trace, tmp_path / "flight.gif")

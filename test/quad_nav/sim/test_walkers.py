@@ -9,13 +9,13 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
-from quad_nav.kernels.social_force import repulsion
 from quad_nav.sim.motion import Walkers
 from quad_nav.sim.movers import Movers
 from quad_nav.sim.scene import Scene, Walls
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.sim.simulation import Simulation
 from quad_nav.sim.simulation_params import STEPS_PER_S
+from quad_nav.sim.social_force import repulsion
 from quad_nav.sim.walkers import MODEL, Crowd
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -57,18 +57,17 @@ class ComposedRobot(LoopRobot):
         super().__init__(configuration, number, frames, start_s)
         names = in_fleet(number)
         costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
-        sinks = sinks_of(costmaps)
-        lidar = [one for one in sinks if _is_of_lidar(one, number, names)]
-        self._intake = ScanIntake(lidar, configuration.scan_validator, self.tracker)
-        others, validator = [one for one in sinks if one not in lidar], configuration.scan_validator
-        self._sensors = sensors.connect(f"quad{number}", others, validator, self.tracker, names)
+        lidar = [one for one in sinks_of(costmaps) if _is_of_lidar(one, number, names)]
+        local_frame = costmaps[1].params.global_frame
+        self._intake = ScanIntake(lidar, self.scan_filters, local_frame)
+        self._sensors = sensors.connect(f"quad{number}", costmaps, self.scan_filters, names, lidar)
         self.intakes = [self._intake, *(sensor.intake for sensor in self._sensors)]
         self._transforms, self._now_s = transforms, start_s
         self._state: Optional[RobotState] = None
         self.interface = RobotInterface(
             configuration,
             self.navigator,
-            self.tracker,
+            self.scan_filters,
             transforms,
             self._located_now,
             names,

@@ -15,7 +15,7 @@ import rospy
 from quad_nav import config
 from quad_nav.config import Configuration
 from quad_nav.errors import InputError, PluginError, printable
-from quad_nav.kernels.jit import cache_warnings, library_remarks
+from quad_nav.files.kernel_cache import cache_warnings
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator.loop import NavigatorLoop
@@ -143,8 +143,6 @@ def prepare(configurations: Collection[Configuration]) -> None:
         rospy.logwarn("%s", warning)
     for configuration in _distinct(configurations):
         _warm_up(configuration)
-    for remark in library_remarks():
-        rospy.loginfo("%s", remark)
 
 
 def _warm_up(configuration: Configuration) -> None:

@@ -6,6 +6,8 @@ import rospy
 from sensor_msgs.msg import PointCloud2, PointField
 from visualization_msgs.msg import MarkerArray
 
+from quad_nav.costmap.scan_filter import ScanFilters
+from quad_nav.costmap.tracks import Tracks
 from quad_nav.ros.common.conversions import replacing_markers, time_message
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.tracked_obstacles import (
@@ -16,16 +18,14 @@ from quad_nav.topics.tracked_obstacles import (
     cloud_rows,
     track_markers,
 )
-from quad_nav.tracking.tracker import ObstacleTracker
-from quad_nav.tracking.tracks import Tracks
 
 
 class ObstacleTopics:
-    """Publishes a tracker's tracks where someone listens."""
+    """Publishes the tracks of a robot's scan filters where someone listens."""
 
-    def __init__(self, tracker: ObstacleTracker, names: Names = own_node) -> None:
-        """Advertise the topics."""
-        self._tracker, self._schedule = tracker, TrackSchedule(tracker)
+    def __init__(self, filters: ScanFilters, frame: str, names: Names = own_node) -> None:
+        """Advertise the topics; ``frame`` is that of the tracks."""
+        self._filters, self._frame, self._schedule = filters, frame, TrackSchedule()
         self._markers = rospy.Publisher(names(f"~{MARKERS_TOPIC}"), MarkerArray, queue_size=1)
         self._cloud = rospy.Publisher(names(f"~{CLOUD_TOPIC}"), PointCloud2, queue_size=1)
 
@@ -35,12 +35,12 @@ class ObstacleTopics:
 
     def publish(self, now_s: float) -> None:
         """Publish the tracks if they are due."""
-        tracks = self._schedule.pop(now_s)
+        tracks = self._schedule.pop(now_s, self._filters.tracks(now_s))
         if tracks is None:
             return
-        frame = self._tracker.frame
+        frame = self._frame
         if self._markers.get_num_connections() > 0:
-            shown = track_markers(tracks, self._tracker.unseen_s, frame)
+            shown = track_markers(tracks, frame)
             self._markers.publish(replacing_markers(shown))
         if self._cloud.get_num_connections() > 0:
             stamp = time_message(tracks.time_s if len(tracks) else now_s)

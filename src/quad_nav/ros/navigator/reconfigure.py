@@ -1,7 +1,7 @@
 """Provide the dynamic_reconfigure services and topics of move_base's namespaces, and of others.
 
 C++ move_base generates its `...Config` modules from `.cfg` files at build time. This module makes
-the same objects from the tables of `quad_nav.config`.
+the same objects from the dataclasses of the parameters.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from dynamic_reconfigure.srv import ReconfigureRequest
 
 from quad_nav import config
 from quad_nav.errors import InputError
+from quad_nav.parameter import Parameter
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.topics.publishing import Names, own_node
 
@@ -44,7 +45,7 @@ _GROUP = {
 }
 
 
-def config_type(name: str, parameters: Sequence[config.Parameter]) -> types.SimpleNamespace:
+def config_type(name: str, parameters: Sequence[Parameter]) -> types.SimpleNamespace:
     """Describe parameters as `dynamic_reconfigure.server.Server` expects it.
 
     Returns:
@@ -178,7 +179,7 @@ class _Callback:
         return requested
 
 
-def _description(parameter: config.Parameter) -> Dict[str, Any]:
+def _description(parameter: Parameter) -> Dict[str, Any]:
     """Return one entry of `config_description`; the type's limits replace missing bounds."""
     least, greatest = {
         "double": (-float("inf"), float("inf")),
@@ -205,7 +206,7 @@ def _description(parameter: config.Parameter) -> Dict[str, Any]:
     }
 
 
-def _edit_method(parameter: config.Parameter) -> str:
+def _edit_method(parameter: Parameter) -> str:
     """Return the choices as rqt_reconfigure parses them; "" for none."""
     if not parameter.choices:
         return ""

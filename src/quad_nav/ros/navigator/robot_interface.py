@@ -12,6 +12,7 @@ from typing import Any, Callable, Dict, Optional, Sequence, Tuple
 import rospy
 
 from quad_nav import config
+from quad_nav.costmap.scan_filter import ScanFilters
 from quad_nav.costmap.scan_intake import ScanIntake
 from quad_nav.errors import PluginError
 from quad_nav.geometry import Pose3D
@@ -29,7 +30,6 @@ from quad_nav.ros.navigator.plan_topics import PlanTopics
 from quad_nav.ros.navigator.reconfigure import serve_namespaces
 from quad_nav.scenario.assembly import reconfigure_robot
 from quad_nav.topics.publishing import Names, own_node
-from quad_nav.tracking.tracker import ObstacleTracker
 
 
 class RobotInterface:
@@ -47,7 +47,7 @@ class RobotInterface:
         self,
         configuration: config.Configuration,
         navigator: Navigator,
-        tracker: ObstacleTracker,
+        scan_filters: ScanFilters,
         transforms: Transforms,
         locate: Callable[[], Tuple[float, RobotPoses]],
         names: Names = own_node,
@@ -59,7 +59,7 @@ class RobotInterface:
         Args:
             configuration: Parameters of the robot.
             navigator: The navigator.
-            tracker: The tracker of moving obstacles.
+            scan_filters: Filters of the robot's scans.
             transforms: Transform tree, for goals in other frames.
             locate: Returns the time and the robot's poses.
             names: Names of the robot's topics, services and parameters.
@@ -70,7 +70,7 @@ class RobotInterface:
         self.lock = threading.RLock()
         self.warnings = ThrottledWarnings()
         self._configuration, self._navigator = configuration, navigator
-        self._intakes, self._tracker = intakes, tracker
+        self._intakes, self._scan_filters = intakes, scan_filters
         self._advertise(names, transforms, locate)
         node = rospy.get_name() if names is own_node else names("~")
         self.health = NavigatorHealth(node.strip("/"), self.name, inputs)
@@ -85,7 +85,9 @@ class RobotInterface:
             for name, costmap in zip(("global", "local"), costmaps)
         }
         self._topics = PlanTopics(self.name, navigator, names)
-        self._obstacles = ObstacleTopics(self._tracker, names)
+        self._obstacles = ObstacleTopics(
+            self._scan_filters, navigator.local_costmap.params.global_frame, names
+        )
         self._reconfigure = serve_namespaces(
             self.name, self._configuration, self._on_reconfigure, names
         )
@@ -107,7 +109,7 @@ class RobotInterface:
     def _on_reconfigure(self, namespace: str, changes: Dict[str, Any]) -> config.Configuration:
         with self.lock:
             configuration = config.updated(self._configuration, namespace, changes)
-            reconfigure_robot(configuration, self._navigator, self._tracker, self._intakes)
+            reconfigure_robot(configuration, self._navigator, self._scan_filters, self._intakes)
             self._configuration = configuration
             return configuration
 

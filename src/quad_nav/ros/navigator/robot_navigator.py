@@ -13,7 +13,6 @@ import rospy
 from nav_msgs.msg import Odometry
 
 from quad_nav.config import Configuration
-from quad_nav.costmap.scan_intake import sinks_of
 from quad_nav.errors import PluginError
 from quad_nav.geometry import Pose3D, Twist2D
 from quad_nav.navigator.tick import RobotPoses
@@ -24,11 +23,10 @@ from quad_nav.ros.navigator import sensors, static_maps
 from quad_nav.ros.navigator.health_meters import InputMeter, NavigatorHealth
 from quad_nav.ros.navigator.peer_topics import PeerTopics
 from quad_nav.ros.navigator.robot_interface import RobotInterface
-from quad_nav.scenario.assembly import build_navigator
+from quad_nav.scenario.assembly import build_navigator, build_scan_filters
 from quad_nav.timing import is_due
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.validation import odometry_problem
-from quad_nav.tracking.tracker import ObstacleTracker
 
 POLL_S = 0.05  # delay after which an idle navigator notices a goal
 FIRST_POSE_S = 0.5
@@ -69,14 +67,12 @@ class RobotNavigator:
         self._transforms, self._peers = transforms, peers
         costmaps = (navigator.global_costmap, navigator.local_costmap)
         self._odometry = rospy.Subscriber(names("odom"), Odometry, self._on_odometry, queue_size=1)
-        self._tracker = ObstacleTracker(configuration.tracker, costmaps[1].params.global_frame)
-        self._sensors = sensors.connect(
-            self.name, sinks_of(costmaps), configuration.scan_validator, self._tracker, names
-        )
+        self._scan_filters = build_scan_filters(configuration)
+        self._sensors = sensors.connect(self.name, costmaps, self._scan_filters, names)
         self._interface = RobotInterface(
             configuration,
             navigator,
-            self._tracker,
+            self._scan_filters,
             transforms,
             self._located_now,
             names,
@@ -149,9 +145,9 @@ class RobotNavigator:
         if not self._start.is_over(now_s, in_global is not None):
             return
         peers = self._peers.near(self.number, located.in_global, navigator.peers.reach_m)
-        self._tracker.end_unseen(now_s)
+        tracks = self._scan_filters.tracks(now_s)
         start_s = time.perf_counter()
-        tick = navigator.tick(now_s, located, self._velocity, peers, self._tracker.active_tracks)
+        tick = navigator.tick(now_s, located, self._velocity, peers, tracks)
         self._interface.publish(tick, in_global, located, time.perf_counter() - start_s)
 
     def _locate(self, now_s: float) -> Tuple[Optional[Pose3D], RobotPoses]:

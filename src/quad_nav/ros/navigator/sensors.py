@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from typing import Any, Deque, Dict, Iterable, List, Optional, Sequence, Tuple
+from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 import rospy
 from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud, PointCloud2, PointField
 
-from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, Sink
-from quad_nav.costmap.scan_validator import ScanValidatorParams
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.scan_filter import ScanFilters
+from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, Sink, sinks_of
 from quad_nav.errors import excerpt
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.ros.common.conversions import ScanMessage, scan_from_message
@@ -25,7 +26,6 @@ from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.ros.navigator.health_meters import InputMeter
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.validation import MAX_MAGNITUDE, MAX_POINTS, scan_problem, stamp_problem
-from quad_nav.tracking.tracker import ObstacleTracker
 
 MESSAGE_TYPES = {"LaserScan": ScanMessage, "PointCloud": PointCloud, "PointCloud2": PointCloud2}
 QUEUE_LENGTH = 50
@@ -57,12 +57,12 @@ class Sensor:
         topic: str,
         data_type: str,
         sinks: Sequence[Sink],
-        params: ScanValidatorParams,
-        tracker: ObstacleTracker,
+        filters: ScanFilters,
+        local_frame: str,
     ) -> None:
         self.topic = topic
         self.data_type = data_type
-        self.intake = ScanIntake(sinks, params, tracker)
+        self.intake = ScanIntake(sinks, filters, local_frame)
         self._robot = robot
         self._waiting: Deque[Tuple[Any, float]] = deque(maxlen=QUEUE_LENGTH)
         self._warnings = ThrottledWarnings()
@@ -276,21 +276,24 @@ def topic_of(sink: Sink, names: Names) -> Tuple[str, str]:
 
 def connect(
     robot: str,
-    sinks: Iterable[Sink],
-    params: ScanValidatorParams,
-    tracker: ObstacleTracker,
+    costmaps: Sequence[LayeredCostmap],
+    filters: ScanFilters,
     names: Names = own_node,
+    others: Sequence[Sink] = (),
 ) -> List[Sensor]:
     """Subscribe to the topics of sources of obstacle layers, to each topic once.
 
     Args:
         robot: Name with which log lines begin.
-        sinks: The sources.
-        params: Parameters of the scan validation.
-        tracker: Tracker of moving obstacles, for the scans.
+        costmaps: The global costmap and the local one.
+        filters: The robot's filters of scans.
         names: Resolves the names of topics.
+        others: Sources that get their messages in another way.
     """
     takers: Dict[Tuple[str, str], List[Sink]] = {}
-    for sink in sinks:
+    for sink in sinks_of(costmaps):
+        if sink in others:
+            continue
         takers.setdefault(topic_of(sink, names), []).append(sink)
-    return [Sensor(robot, *key, those, params, tracker) for key, those in takers.items()]
+    local_frame = costmaps[1].params.global_frame
+    return [Sensor(robot, *key, those, filters, local_frame) for key, those in takers.items()]

@@ -29,11 +29,11 @@ from std_srvs.srv import (
 )
 from visualization_msgs.msg import Marker, MarkerArray
 
-from quad_nav.config import Parameter
 from quad_nav.errors import InputError, printable
+from quad_nav.files.kernel_cache import cache_warnings
 from quad_nav.files.values import is_number
-from quad_nav.kernels.jit import cache_warnings
 from quad_nav.loop.flight_loop import STEPS_PER_ODOMETRY
+from quad_nav.parameter import Parameter
 from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.readiness import server_parameters, start_node
 from quad_nav.ros.common.rospy_repairs import refuse_second, set_time

@@ -1,0 +1,256 @@
+"""Evasion of moving obstacles: the command nearest to the wish that keeps clear of all of them.
+
+Each command of a polar grid is flown in thought, with the response of the body, against what stands
+in the local costmap and where the moving obstacles can be. The wish stays if it keeps clear; else
+the nearest velocity that does replaces it. There are two ways to say where an obstacle can be:
+
+* It keeps its velocity (``max_acceleration`` 0). The robot keeps clear for three seconds. Where no
+  velocity does, it flies the one whose contact comes latest. This is for what does not react.
+* It turns, stops and starts within its greatest acceleration and speed. The robot flies commands
+  after which it can be at rest before any obstacle can reach it, or else it brakes. At rest it may
+  be touched. This is for people, who go around a robot that rests.
+
+Sources: P. Fiorini, Z. Shiller, "Motion Planning in Dynamic Environments Using Velocity
+Obstacles", IJRR 17(7), 1998, sections 2 and 4: velocities outside of all velocity obstacles, the
+one nearest to the goal's; K. Macek, D. Vasquez, T. Fraichard, R. Siegwart, "Towards Safe Vehicle
+Navigation in Dynamic Urban Scenarios", Automatika 50, 2009: passive safety.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, Optional, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_moving.first_contact import Body, Standing, first_contacts
+from quad_moving.params import number, read
+from quad_nav.config.plugins import Parameters
+from quad_nav.control.dwa_planner_params import DwaParams
+from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.costmap.tracks import Tracks
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.grid import INSCRIBED, LETHAL
+from quad_nav.navigator.command_filter import Command, CommandFilter, Situation, StopReason
+
+Floats = NDArray[np.float64]
+
+LIMITED_BY = "moving obstacle"
+"""``Command.limited_by`` of an evasion."""
+BODY = Body(gain_per_s=25.0 / 8.0, acceleration_mps2=2.0, still_mps=0.05)
+"""Response of the simulated quadcopter, see ``quad_nav/sim/flight.py``; people count 0.05 m/s as
+rest, see ``bench/walkers.py``."""
+STEP_S = 0.1
+"""A tenth of a second: at 2 m/s the robot flies 0.2 m, less than its radius."""
+SPEEDS, COURSES = 6, 32
+"""The polar grid of commands: 0.33 m/s and 11 degrees apart at 2 m/s."""
+HOLD_PERIODS = 1.5
+"""A command acts until the next one, and odometry is half a period old on average."""
+AT_POINT_M = 0.15
+"""A robot that hovers returns to its point from farther away, about the tolerance of a goal."""
+RETURN_GAIN_PER_S = 1.0
+"""Slower than the response of the body, so that the robot does not overshoot its point."""
+
+
+@dataclass(frozen=True)
+class EvasionParams:
+    """Parameters of ``quad_moving/Evasion``."""
+
+    clearance_m: float = number(
+        "clearance", 0.1, "m", 0, 2, "Distance that the robot keeps from moving obstacles."
+    )
+    max_speed_mps: float = number(
+        "max_speed",
+        0.0,
+        "m/s",
+        0,
+        10,
+        "Greatest speed of an evasion; the local planner's if that is greater.",
+    )
+    horizon_s: float = number(
+        "horizon",
+        2.0,
+        "s",
+        0,
+        10,
+        "Time for which the robot keeps clear; 0: until it is at rest, where it may be touched.",
+    )
+    max_acceleration_mps2: float = number(
+        "max_acceleration", 1.0, "m/s^2", 0, 100, "Greatest acceleration of obstacles."
+    )
+    max_obstacle_speed_mps: float = number(
+        "max_obstacle_speed",
+        1.6,  # ISO 13855:2010: people walk at 1.6 m/s
+        "m/s",
+        0,
+        10,
+        "Greatest speed of obstacles, unless they are faster already.",
+    )
+
+
+class Evasion(CommandFilter):
+    """Command filter that evades moving obstacles, also while the robot hovers.
+
+    The robot has to fly sideways: ``holonomic_robot`` or ``max_vel_y``. Another one is left alone.
+
+    Attributes:
+        params: The parameters.
+    """
+
+    acts_when_idle = True
+
+    def __init__(self, params: Parameters) -> None:
+        """Evade nothing yet.
+
+        Raises:
+            InputError: A parameter is unknown or out of range.
+        """
+        self.params = read(EvasionParams, params)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the last evasion."""
+        self._evades = False
+        self._point: Optional[Pose2D] = None  # where a robot that follows no plan stopped
+
+    def filter(self, command: Command, situation: Situation) -> Command:
+        """Return the command, or the nearest one that keeps clear of moving obstacles."""
+        usual_mps = usual_speed_mps(situation.planner_params)
+        if situation.tracks is None or usual_mps is None:
+            return command
+        tracks = situation.tracks.at(situation.now_s)
+        wish = self._wish(command, situation, usual_mps)
+        speed_mps = math.hypot(situation.velocity.vx_mps, situation.velocity.vy_mps)
+        is_fast = self._evades and speed_mps > usual_mps  # the local planner could not stop it
+        self._evades = False
+        if not tracks.any_may_move and not is_fast:
+            return self._returning(command, wish)
+        found = self._choose(wish, tracks, situation, usual_mps)
+        if found is None:
+            return self._returning(command, wish)
+        self._evades = True
+        return Command(found, StopReason.FILTER if found.is_zero else None, LIMITED_BY)
+
+    def _wish(self, command: Command, situation: Situation, usual_mps: float) -> Twist2D:
+        """Return the command's velocity; of a robot that stands, the one back to its point."""
+        wish, pose = command.velocity, situation.map_pose
+        if command.stop is None:
+            self._point = None
+            return wish
+        self._point = self._point or pose
+        if pose.distance_to(self._point) <= AT_POINT_M:
+            return wish
+        x_m, y_m = pose.inverse_transform(self._point.x_m, self._point.y_m)
+        gain_per_s = min(RETURN_GAIN_PER_S, usual_mps / math.hypot(x_m, y_m))
+        return replace(wish, vx_mps=gain_per_s * x_m, vy_mps=gain_per_s * y_m)
+
+    def _returning(self, command: Command, wish: Twist2D) -> Command:
+        return command if wish is command.velocity else Command(wish, None, LIMITED_BY)
+
+    def _choose(
+        self, wish: Twist2D, tracks: Tracks, situation: Situation, usual_mps: float
+    ) -> Optional[Twist2D]:
+        """Return the command to fly; None for the wish."""
+        pose, velocity = situation.pose, situation.velocity
+        wished = np.array(pose.rotate(wish.vx_mps, wish.vy_mps))
+        now = np.array(pose.rotate(velocity.vx_mps, velocity.vy_mps))
+        speed_mps = max(self.params.max_speed_mps, usual_mps)
+        commands = np.concatenate([[wished], polar_grid(speed_mps)])
+        contacts_s = self._contacts_s(commands, now, tracks, situation, speed_mps)
+        is_clear = np.isinf(contacts_s)
+        if is_clear[0]:
+            return None
+        if is_clear.any():
+            away_mps = np.hypot(*(commands - wished).T)
+            best = commands[int(np.argmin(np.where(is_clear, away_mps, np.inf)))]
+        elif self.params.horizon_s == 0.0:
+            best = -now
+        else:
+            best = commands[int(np.argmax(contacts_s))]
+        vx_mps, vy_mps = Pose2D(0.0, 0.0, -pose.yaw_rad).rotate(*best.tolist())
+        return replace(wish, vx_mps=vx_mps, vy_mps=vy_mps)
+
+    def _contacts_s(
+        self,
+        commands: Floats,
+        velocity: Floats,
+        tracks: Tracks,
+        situation: Situation,
+        speed_mps: float,
+    ) -> Floats:
+        """Return the time of each command's first contact, see ``first_contacts``."""
+        hold_s = horizon_s = self.params.horizon_s
+        body = BODY._replace(still_mps=0.0)
+        if horizon_s == 0.0:
+            body, hold_s = BODY, HOLD_PERIODS * situation.period_s
+            fastest_mps = max(speed_mps, float(np.hypot(*velocity)))
+            horizon_s = hold_s + fastest_mps / BODY.acceleration_mps2 + STEP_S
+        times_s = STEP_S * np.arange(math.ceil(horizon_s / STEP_S) + 1)
+        radius_m = situation.costmap.inscribed_radius_m + self.params.clearance_m
+        discs, walks = places(self.params, tracks, situation.pose, radius_m, times_s)
+        contacts_s = np.empty(len(commands))
+        hold = max(round(hold_s / STEP_S), 1)
+        standing = standing_of(situation)
+        first_contacts(body, standing, discs, walks, velocity, commands, hold, STEP_S, contacts_s)
+        return contacts_s
+
+
+def places(
+    params: EvasionParams, tracks: Tracks, pose: Pose2D, radius_m: float, times_s: Floats
+) -> Tuple[Floats, Floats]:
+    """Return where obstacles can be, as ``first_contacts`` takes it.
+
+    An obstacle is within half its acceleration times the time squared of the way of its velocity,
+    and no farther from its present place than its greatest speed takes it.
+
+    Args:
+        params: The parameters.
+        tracks: The obstacles now.
+        pose: Pose of the robot in the same frame.
+        radius_m: Radius of the robot and the clearance.
+        times_s: float64[t], from 0.
+
+    Returns:
+        Discs, float64[t, n, 3], and the greatest distances from the first places, float64[t, n].
+    """
+    states = np.concatenate([tracks.states, tracks.suspects[:, :4]])
+    radii_m = np.append(tracks.radii_m, tracks.suspects[:, 4]) + radius_m
+    after_s = times_s[:, None]
+    discs = np.empty((len(times_s), len(states), 3))
+    discs[:, :, 0] = states[:, 0] - pose.x_m + after_s * states[:, 2]
+    discs[:, :, 1] = states[:, 1] - pose.y_m + after_s * states[:, 3]
+    discs[:, :, 2] = radii_m + 0.5 * params.max_acceleration_mps2 * after_s**2
+    fastest_mps = np.maximum(np.hypot(*states[:, 2:].T), params.max_obstacle_speed_mps)
+    walks: Floats = radii_m + fastest_mps * after_s
+    return discs, walks
+
+
+def polar_grid(max_speed_mps: float) -> Floats:
+    """Return the hover and velocities of several speeds and courses, float64[c, 2]."""
+    angles = np.arange(COURSES) * (2.0 * math.pi / COURSES)
+    ring = np.column_stack([np.cos(angles), np.sin(angles)])
+    steps = max_speed_mps * np.arange(1, SPEEDS + 1) / SPEEDS
+    return np.concatenate([np.zeros((1, 2)), *(speed * ring for speed in steps)])
+
+
+def standing_of(situation: Situation) -> Standing:
+    """Return what stands; a robot that is in the inscribed radius already may leave it."""
+    spec, costs, pose = situation.costmap.spec, situation.costmap.costs, situation.pose
+    cell = spec.cell_of(pose.x_m, pose.y_m)
+    own = 0 if cell is None else int(costs[cell[1], cell[0]])
+    limit = INSCRIBED if own < INSCRIBED else min(own, LETHAL) + 1
+    left_m, low_m = spec.origin_x_m - pose.x_m, spec.origin_y_m - pose.y_m
+    return Standing(costs, left_m, low_m, spec.resolution_m, limit)
+
+
+def usual_speed_mps(planner_params: Any) -> Optional[float]:
+    """Return a local planner's greatest speed in any direction, None if it flies ahead alone."""
+    if isinstance(planner_params, TrajectoryPlannerParams) and planner_params.holonomic_robot:
+        return planner_params.max_vel_x_mps
+    if isinstance(planner_params, DwaParams) and planner_params.max_vel_y_mps > 0.0:
+        if planner_params.max_vel_trans_mps < 0.0:
+            return planner_params.max_vel_x_mps
+        return planner_params.max_vel_trans_mps
+    return None

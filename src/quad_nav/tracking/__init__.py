@@ -1,1 +1,0 @@
-"""Moving obstacles from the LIDAR alone: what moves, where it is and where it goes."""
