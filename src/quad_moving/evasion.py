@@ -1,38 +1,46 @@
 """Evasion of moving obstacles: the command nearest to the wish that keeps clear of all of them.
 
-Each command of a polar grid is flown in thought, with the response of the body, against what stands
-in the local costmap and where the moving obstacles can be. The wish stays if it keeps clear; else
-the nearest velocity that does replaces it. There are two ways to say where an obstacle can be:
+Each command of a polar grid is flown in thought, with the response of the body. It keeps clear if
+no moving obstacle can touch the robot within its greatest acceleration and speed, and if the robot
+can stop before what stands in the local costmap. The wish stays if it keeps clear; else the nearest
+velocity that does replaces it. There are two ways to fly:
 
-* It keeps its velocity (``max_acceleration`` 0). The robot keeps clear for three seconds. Where no
-  velocity does, it flies the one whose contact comes latest. This is for what does not react.
-* It turns, stops and starts within its greatest acceleration and speed. The robot flies commands
-  after which it can be at rest before any obstacle can reach it, or else it brakes. At rest it may
-  be touched. This is for people, who go around a robot that rests.
+* The robot keeps clear for a time, ``horizon``. Where no velocity does, it flies the one with which
+  an obstacle needs the greatest acceleration to touch it. This is for what does not react.
+* With ``horizon`` 0 it keeps clear until it is at rest, where it may be touched; if it cannot, it
+  brakes. This is passive safety, for people, who go around a robot that rests.
 
 Sources: P. Fiorini, Z. Shiller, "Motion Planning in Dynamic Environments Using Velocity
-Obstacles", IJRR 17(7), 1998, sections 2 and 4: velocities outside of all velocity obstacles, the
-one nearest to the goal's; K. Macek, D. Vasquez, T. Fraichard, R. Siegwart, "Towards Safe Vehicle
-Navigation in Dynamic Urban Scenarios", Automatika 50, 2009: passive safety.
+Obstacles", IJRR 17(7), 1998, sections 2 and 4: of the velocities outside of all velocity obstacles,
+the one nearest to the goal's; S. Bouraine, T. Fraichard, H. Salhi, "Provably safe navigation for
+mobile robots with limited field-of-views in dynamic environments", Autonomous Robots 32, 2012:
+passive safety against all that obstacles can reach.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Optional, Tuple
+from typing import Any, Optional
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_moving.first_contact import Body, Standing, first_contacts
 from quad_moving.params import number, read
+from quad_moving.reachable import (
+    BLOCKED,
+    Body,
+    Flight,
+    Obstacles,
+    Standing,
+    needed_accelerations,
+)
 from quad_nav.config.plugins import Parameters
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.grid import INSCRIBED, LETHAL
+from quad_nav.grid import INSCRIBED
 from quad_nav.navigator.command_filter import Command, CommandFilter, Situation, StopReason
 
 Floats = NDArray[np.float64]
@@ -158,73 +166,50 @@ class Evasion(CommandFilter):
         now = np.array(pose.rotate(velocity.vx_mps, velocity.vy_mps))
         speed_mps = max(self.params.max_speed_mps, usual_mps)
         commands = np.concatenate([[wished], polar_grid(speed_mps)])
-        contacts_s = self._contacts_s(commands, now, tracks, situation, speed_mps)
-        is_clear = np.isinf(contacts_s)
+        needed_mps2 = self._needed_mps2(commands, now, tracks, situation)
+        is_clear = needed_mps2 >= self.params.max_acceleration_mps2
         if is_clear[0]:
             return None
         if is_clear.any():
             away_mps = np.hypot(*(commands - wished).T)
             best = commands[int(np.argmin(np.where(is_clear, away_mps, np.inf)))]
-        elif self.params.horizon_s == 0.0:
-            best = -now
+        elif self.params.horizon_s > 0.0 and needed_mps2.max() > BLOCKED:
+            best = commands[int(np.argmax(needed_mps2))]
         else:
-            best = commands[int(np.argmax(contacts_s))]
+            best = -now
         vx_mps, vy_mps = Pose2D(0.0, 0.0, -pose.yaw_rad).rotate(*best.tolist())
         return replace(wish, vx_mps=vx_mps, vy_mps=vy_mps)
 
-    def _contacts_s(
-        self,
-        commands: Floats,
-        velocity: Floats,
-        tracks: Tracks,
-        situation: Situation,
-        speed_mps: float,
+    def _needed_mps2(
+        self, commands: Floats, velocity: Floats, tracks: Tracks, situation: Situation
     ) -> Floats:
-        """Return the time of each command's first contact, see ``first_contacts``."""
-        hold_s = horizon_s = self.params.horizon_s
-        body = BODY._replace(still_mps=0.0)
-        if horizon_s == 0.0:
-            body, hold_s = BODY, HOLD_PERIODS * situation.period_s
-            fastest_mps = max(speed_mps, float(np.hypot(*velocity)))
-            horizon_s = hold_s + fastest_mps / BODY.acceleration_mps2 + STEP_S
-        times_s = STEP_S * np.arange(math.ceil(horizon_s / STEP_S) + 1)
-        radius_m = situation.costmap.inscribed_radius_m + self.params.clearance_m
-        discs, walks = places(self.params, tracks, situation.pose, radius_m, times_s)
-        contacts_s = np.empty(len(commands))
+        """Return which acceleration an obstacle needs to touch the robot, float64[c]."""
+        horizon_s, hold_s = self.params.horizon_s, HOLD_PERIODS * situation.period_s
         hold = max(round(hold_s / STEP_S), 1)
-        standing = standing_of(situation)
-        first_contacts(body, standing, discs, walks, velocity, commands, hold, STEP_S, contacts_s)
-        return contacts_s
+        flight = Flight(STEP_S, math.ceil(horizon_s / STEP_S), hold, horizon_s == 0.0)
+        radius_m = situation.costmap.inscribed_radius_m + self.params.clearance_m
+        obstacles = obstacles_of(self.params, tracks, situation.pose, radius_m)
+        needed_mps2 = np.empty(len(commands))
+        needed_accelerations(
+            BODY, standing_of(situation), obstacles, flight, velocity, commands, needed_mps2
+        )
+        return needed_mps2
 
 
-def places(
-    params: EvasionParams, tracks: Tracks, pose: Pose2D, radius_m: float, times_s: Floats
-) -> Tuple[Floats, Floats]:
-    """Return where obstacles can be, as ``first_contacts`` takes it.
-
-    An obstacle is within half its acceleration times the time squared of the way of its velocity,
-    and no farther from its present place than its greatest speed takes it.
+def obstacles_of(params: EvasionParams, tracks: Tracks, pose: Pose2D, radius_m: float) -> Obstacles:
+    """Return what moves or may move.
 
     Args:
         params: The parameters.
         tracks: The obstacles now.
         pose: Pose of the robot in the same frame.
         radius_m: Radius of the robot and the clearance.
-        times_s: float64[t], from 0.
-
-    Returns:
-        Discs, float64[t, n, 3], and the greatest distances from the first places, float64[t, n].
     """
     states = np.concatenate([tracks.states, tracks.suspects[:, :4]])
+    speeds_mps = np.maximum(np.hypot(*states[:, 2:].T), params.max_obstacle_speed_mps)
+    states[:, :2] -= (pose.x_m, pose.y_m)
     radii_m = np.append(tracks.radii_m, tracks.suspects[:, 4]) + radius_m
-    after_s = times_s[:, None]
-    discs = np.empty((len(times_s), len(states), 3))
-    discs[:, :, 0] = states[:, 0] - pose.x_m + after_s * states[:, 2]
-    discs[:, :, 1] = states[:, 1] - pose.y_m + after_s * states[:, 3]
-    discs[:, :, 2] = radii_m + 0.5 * params.max_acceleration_mps2 * after_s**2
-    fastest_mps = np.maximum(np.hypot(*states[:, 2:].T), params.max_obstacle_speed_mps)
-    walks: Floats = radii_m + fastest_mps * after_s
-    return discs, walks
+    return Obstacles(states, radii_m, speeds_mps)
 
 
 def polar_grid(max_speed_mps: float) -> Floats:
@@ -236,13 +221,10 @@ def polar_grid(max_speed_mps: float) -> Floats:
 
 
 def standing_of(situation: Situation) -> Standing:
-    """Return what stands; a robot that is in the inscribed radius already may leave it."""
+    """Return what stands."""
     spec, costs, pose = situation.costmap.spec, situation.costmap.costs, situation.pose
-    cell = spec.cell_of(pose.x_m, pose.y_m)
-    own = 0 if cell is None else int(costs[cell[1], cell[0]])
-    limit = INSCRIBED if own < INSCRIBED else min(own, LETHAL) + 1
     left_m, low_m = spec.origin_x_m - pose.x_m, spec.origin_y_m - pose.y_m
-    return Standing(costs, left_m, low_m, spec.resolution_m, limit)
+    return Standing(costs, left_m, low_m, spec.resolution_m, INSCRIBED)
 
 
 def usual_speed_mps(planner_params: Any) -> Optional[float]:

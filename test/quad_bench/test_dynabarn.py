@@ -126,10 +126,6 @@ def test_a_flight_starts_later_where_an_obstacle_is_at_the_start(tmp_path):
     assert flight.scene.motion_phase_s == pytest.approx(drawn + math.ceil(90.0 - drawn), abs=1.01)
 
 
-def evasion_speed_mps(contestant):
-    return contestant.configuration.tree["evasion"]["max_speed"]
-
-
 @pytest.mark.parametrize("given, limit", [(0.5, 0.5), (0.3, 0.3), (0.0, 1.2)])
 def test_the_speed_limit(worlds, given, limit):
     setup = read_dynamic_setup(options(worlds), "spline", given)
@@ -143,7 +139,7 @@ def test_evasions_keep_to_the_speed_limit_unless_another_one_is_set(worlds, give
     parameters = () if given is None else (("evasion/max_speed", given),)
     asked = options(worlds, config="moving", parameters=parameters)
     contestant = read_dynamic_setup(asked, "spline", 0.5).contestant
-    assert evasion_speed_mps(contestant) == speed
+    assert contestant.configuration.tree["evasion"]["max_speed"] == speed
     assert contestant.configuration.local_planner.max_vel_x_mps == 0.5
     assert contestant.simulation.flight.max_speed_mps == body
 

@@ -13,11 +13,11 @@ from quad_moving.evasion import (
     LIMITED_BY,
     Evasion,
     EvasionParams,
-    places,
+    obstacles_of,
     polar_grid,
     usual_speed_mps,
 )
-from quad_moving.first_contact import Body, Standing, first_contacts
+from quad_moving.reachable import Body, Flight, Obstacles, Standing, needed_accelerations
 from quad_nav.config.plugins import Parameters
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
@@ -62,59 +62,72 @@ def evade(command, seen, params=None, **around):
     return Evasion(Parameters(params, "evasion")).filter(command, situation(seen, **around))
 
 
-def contact_s(
-    command, disc, velocity=(0.0, 0.0), hold=30, walk_m=math.inf, standing=None, still_mps=0.05
-):
-    """The first contact of a robot that follows a command at once, steps of 0.1 s."""
-    discs = np.tile(np.array(disc, float), (31, 1, 1))
+def needed(command, state, velocity=(0.0, 0.0), rests=False, hold=2, standing=None, body=None):
+    """What an obstacle of 0.5 m, at most 1.6 m/s fast, needs within 3 s; steps of 0.1 s.
+
+    The body follows a command at once unless another one is given.
+    """
     standing = standing or Standing(np.zeros((1, 1), np.uint8), 0.0, 0.0, 1.0, 253)
-    found, body = np.empty(1), Body(1e3, 1e3, still_mps)
-    walks = np.full((31, 1), walk_m)
-    commands = np.array([command], float)
-    first_contacts(body, standing, discs, walks, np.array(velocity), commands, hold, 0.1, found)
+    flight, found = Flight(0.1, 30, hold, rests), np.empty(1)
+    obstacles = Obstacles(np.array([state], float), np.array([0.5]), np.array([1.6]))
+    body = body or Body(10.0, 1e3, 0.05)
+    velocity, commands = np.array(velocity), np.array([command], float)
+    needed_accelerations(body, standing, obstacles, flight, velocity, commands, found)
     return found[0]
 
 
-def test_the_time_of_a_contact():
-    """At 1 m/s a disc of 0.5 m around (1.45, 0) begins after 0.95 s."""
-    assert contact_s([1.0, 0.0], [1.45, 0.0, 0.5], (1.0, 0.0)) == pytest.approx(1.0)
-    assert contact_s([0.0, 1.0], [1.45, 0.0, 0.5], (0.0, 1.0)) == math.inf
+def test_an_obstacle_needs_an_acceleration_to_touch_a_hovering_robot():
+    """It stands 1.5 m away: with 2 * 1 m / (3 s)^2 it is there after 3 s; 1.6 m/s is enough."""
+    assert needed([0.0, 0.0], [1.5, 0.0, 0.0, 0.0]) == pytest.approx(2.0 / 9.0)
 
 
-def test_a_robot_at_rest_may_be_touched():
-    assert contact_s([0.0, 0.0], [0.2, 0.0, 0.5]) == math.inf
-
-
-def test_a_robot_that_brakes_in_time_is_clear():
-    """It follows the command for 0.5 s, and stands at 0.55 m at the latest."""
-    assert contact_s([1.0, 0.0], [1.2, 0.0, 0.5], (1.0, 0.0), hold=5) == math.inf
-    assert contact_s([1.0, 0.0], [0.9, 0.0, 0.5], (1.0, 0.0), hold=5) == pytest.approx(0.5)
+def test_an_obstacle_that_comes_needs_none():
+    """At 1 m/s it is 0.5 m away after 1 s, and on the robot then: -2 * 0.5 m / (1.5 s)^2."""
+    found = needed([0.0, 0.0], [1.5, 0.0, -1.0, 0.0])
+    assert found == pytest.approx(-2.0 * 0.5 / 1.5**2, rel=0.02)
 
 
 def test_nobody_is_farther_than_a_walk():
-    assert contact_s([1.0, 0.0], [1.0, 0.0, 0.5], (1.0, 0.0), walk_m=0.3) == pytest.approx(0.8)
+    """3 s at 1.6 m/s are 4.8 m."""
+    assert needed([0.0, 0.0], [5.4, 0.0, 0.0, 0.0]) == math.inf
+    assert needed([0.0, 0.0], [5.2, 0.0, 0.0, 0.0]) == pytest.approx(2.0 * 4.7 / 9.0)
 
 
 def test_a_robot_may_fly_away_from_what_it_touches():
-    assert contact_s([-1.0, 0.0], [0.3, 0.0, 0.5], (-1.0, 0.0)) == math.inf
-    assert contact_s([1.0, 0.0], [0.3, 0.0, 0.5], (1.0, 0.0)) < math.inf
+    touching = [0.3, 0.0, 0.0, 0.0]
+    assert needed([-1.0, 0.0], touching, (-1.0, 0.0)) > 0.0 > needed([1.0, 0.0], touching)
 
 
-def test_a_command_into_what_stands_is_none():
-    wall = Standing(np.array([[0, 254]], np.uint8), -0.5, -0.5, 1.0, 253)  # from x = 0.5 m on
-    assert contact_s([1.0, 0.0], [9.0, 9.0, 0.5], (1.0, 0.0), standing=wall) == -1.0
-    assert contact_s([-1.0, 0.0], [9.0, 9.0, 0.5], (-1.0, 0.0), standing=wall) == math.inf
+def test_a_robot_at_rest_may_be_touched_if_it_rests():
+    coming = [1.5, 0.0, -1.0, 0.0]
+    assert needed([0.0, 0.0], coming, rests=True) == math.inf
+    assert needed([0.0, 0.0], coming) < 0.0
 
 
-def test_where_obstacles_can_be():
-    """After 0.5 s 6 m/s^2 is 0.75 m, and a walk of 1.6 m/s is 0.8 m."""
-    seen = tracks([2.0, 0.0, -0.8, 0.0], suspects=[[1.0, 1.0, 0.0, 0.0, 0.3]])
-    times_s = np.array([0.0, 0.5])
-    discs, walks = places(EvasionParams(max_acceleration_mps2=6.0), seen, HERE, 0.45, times_s)
-    np.testing.assert_allclose(discs[1], [[1.6, 0.0, 0.7 + 0.75], [1.0, 1.0, 0.75 + 0.75]])
-    np.testing.assert_allclose(walks, [[0.7, 0.75], [0.7 + 0.8, 0.75 + 0.8]])
-    discs, _ = places(EvasionParams(max_acceleration_mps2=0.0), seen, HERE, 0.45, times_s)
-    np.testing.assert_allclose(discs[1, :, 2], [0.7, 0.75])
+def test_a_robot_that_brakes_in_time_is_clear():
+    """It flies 0.2 m in 0.2 s and brakes at 2 m/s^2: 0.25 m more and half a second."""
+    body = Body(10.0, 2.0, 0.05)
+    stands = [1.2, 0.0, 0.0, 0.0]
+    found = needed([1.0, 0.0], stands, (1.0, 0.0), rests=True, body=body)
+    assert found == pytest.approx(2.0 * (1.2 - 0.44 - 0.5) / 0.6**2, rel=0.01)
+
+
+def test_a_command_after_which_the_robot_cannot_stop_before_a_wall_is_none():
+    """From x = 0.5 m on; it flies 0.2 m and needs 0.25 m to stop."""
+    body, far = Body(10.0, 2.0, 0.05), [9.0, 9.0, 0.0, 0.0]
+    for wall_x_m, stops in ((0.5, True), (0.4, False)):
+        wall = Standing(np.array([[0, 254]], np.uint8), wall_x_m - 1.0, -0.5, 1.0, 253)
+        found = needed([1.0, 0.0], far, (1.0, 0.0), standing=wall, body=body)
+        assert bool(found == math.inf) is stops
+
+
+def test_obstacles_are_tracks_and_what_may_move():
+    seen = tracks([2.0, 0.0, -2.0, 0.0], suspects=[[1.0, 1.0, 0.0, 0.0, 0.3]])
+    found = obstacles_of(EvasionParams(), seen, Pose2D(0.5, 0.0), 0.45)
+    np.testing.assert_allclose(found.states, [[1.5, 0.0, -2.0, 0.0], [0.5, 1.0, 0.0, 0.0]])
+    np.testing.assert_allclose(found.radii_m, [0.7, 0.75])
+    np.testing.assert_allclose(found.speeds_mps, [2.0, 1.6])
+    assert seen.states[0, 0] == 2.0
 
 
 def test_the_grid_has_the_hover_and_all_courses():
@@ -154,14 +167,14 @@ def test_a_wall_closes_a_side():
     assert found.velocity.vy_mps > -0.05 and not found.velocity.is_zero
 
 
-def test_where_no_velocity_is_clear_the_contact_comes_as_late_as_possible():
+def test_where_no_velocity_is_clear_the_robot_flees():
     """In a corridor something comes faster than the robot can fly back."""
     costs = np.zeros(SPEC.shape, np.uint8)
     costs[:74] = costs[86:] = LETHAL  # y beyond 0.3 m
     found = evade(
         Command(AHEAD), tracks([2.0, 0.0, -1.5, 0.0]), {**PLAIN, "max_speed": 0.5}, costs=costs
     )
-    assert found.velocity.vx_mps < -0.3
+    assert found.velocity.vx_mps < -0.2
 
 
 def test_a_robot_without_a_goal_returns_to_its_point():
@@ -174,7 +187,7 @@ def test_a_robot_without_a_goal_returns_to_its_point():
 
 def test_a_robot_that_is_fast_from_an_evasion_brakes_before_a_wall():
     costs = np.zeros(SPEC.shape, np.uint8)
-    costs[:, 92:] = LETHAL  # x above 0.6 m
+    costs[:, 90:] = LETHAL  # x above 0.5 m; it needs 0.56 m to stop at 2 m/s^2
     evasion = Evasion(Parameters({**PLAIN, "max_speed": 2.0}, "evasion"))
     evasion.filter(Command(AHEAD), situation(tracks([-1.0, 0.0, 1.5, 0.0])))
     fast = situation(tracks(), velocity=Twist2D(vx_mps=1.5), costs=costs)

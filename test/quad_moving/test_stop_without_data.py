@@ -173,12 +173,16 @@ def test_with_data_again_it_goes_on():
     assert any(tick.limited_by for tick in flight.ticks(0.2))
 
 
-def test_upstream_goes_on_recovering_without_scans():
+def test_upstream_goes_on_recovering_without_scans_and_does_not_evade():
     flight = Threatened(UPSTREAM)
     recovers(flight)
+    flight.threat = False
     flight.ticks(2.0)
     no_scans(flight)
-    assert Twist2D(vyaw_radps=1.0) in [tick.command for tick in flight.ticks(1.0)]
+    turning = Twist2D(vyaw_radps=1.0)
+    assert turning in [tick.command for tick in flight.ticks(1.0)]
+    flight.threat = True
+    assert all(tick.command in (None, turning, Twist2D()) for tick in flight.ticks(1.0))
 
 
 @pytest.mark.parametrize("frequency_hz", [2.0, 20.0])

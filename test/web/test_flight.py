@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -54,6 +55,21 @@ def test_a_quadcopter_arrives_at_a_goal_that_was_clicked(flight):
     flight.click_arena(8.0, 1.5)
     flight.says("quad1")
     flight.wait_for_arena(near(1, 8.0, 1.5), timeout_s=60)
+
+
+def test_goals_are_edited_before_the_flight(serve, open_page, goals, tmp_path):
+    """The tab of goals is open; an edit shows the new plan, and is saved to the file."""
+    file = Path(shutil.copy(goals / "quad0_goals.json", tmp_path))
+    command = [sys.executable, "-m", "quad_nav.cli", "preview", "--edit", "--goals", tmp_path]
+    driver = Driver(open_page(serve(command=command).url))
+    expect(driver.at("flight-state")).to_have_text("ready")
+    expect(driver.at("stop-all")).to_be_disabled()
+    driver.at("g-y-0").fill("4.0")
+    driver.at("g-y-0").press("Enter")
+    driver.wait_for_arena("arena.fleet.plans[0].points.at(-1) > 3.9")
+    driver.at("goals-save").click()
+    driver.says("saved, 1 goal")
+    assert json.loads(file.read_text())["goals"] == [[1.4, 4.0]]
 
 
 def test_stop_all_ends_a_flight(flight):

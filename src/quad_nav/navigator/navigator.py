@@ -216,8 +216,9 @@ class Navigator:
         if poses.in_global is not None:
             self._control.limiter.check(now_s, poses.in_global)
         self._propose(tick, poses, velocity)
+        proposed = tick.command
         self._filter(tick, poses, velocity, tracks)
-        self._stop_without_data(tick, poses)  # last: nothing overrides it
+        self._stop_without_data(tick, poses, proposed)  # last: nothing overrides it
         if tick.command is not None:
             self.filters.last = tick.command
         if tick.is_stopped:
@@ -278,13 +279,16 @@ class Navigator:
             self.peers,
         )
 
-    def _stop_without_data(self, tick: Tick, poses: RobotPoses) -> None:
+    def _stop_without_data(
+        self, tick: Tick, poses: RobotPoses, proposed: Optional[Twist2D]
+    ) -> None:
         """Stop a robot that does not know where it is or what is around it."""
         command = tick.command or self.filters.last
         if command.is_zero or (tick.command is None and self.state is not State.IDLE):
             return  # it stands, or the next control cycle stops it
-        if self._recovery.is_running and not self._machine.stops_without_data:
-            return  # as upstream
+        recovers = tick.command is not None and tick.command is proposed
+        if recovers and not self._machine.stops_without_data:
+            return  # a recovery goes on, as upstream
         missing = self._machine.missing_data(tick.now_s, poses)
         if missing:
             self._machine.stop_without_data(tick, missing)

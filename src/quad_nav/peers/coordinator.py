@@ -27,7 +27,7 @@ from quad_nav.peers.peer import (
 from quad_nav.peers.peer_costs import PeerCosts
 from quad_nav.peers.peer_params import PeerParams
 from quad_nav.peers.peer_tracker import PeerTracker
-from quad_nav.peers.right_of_way import STRANGER, Yield, YieldDecision
+from quad_nav.peers.right_of_way import MOVING_OBSTACLE, Yield, YieldDecision
 from quad_nav.peers.roundabout import Roundabout
 from quad_nav.peers.stand_off import StandOff
 from quad_nav.peers.voronoi_cell import LimitedCommand, limit_to_cell
@@ -179,7 +179,7 @@ class PeerCoordinator:
         local_from_global: Optional[Pose2D],
         peers: Sequence[Peer],
         cruise_mps: float,
-        strangers: Optional[Tracks] = None,
+        tracks: Optional[Tracks] = None,
     ) -> List[str]:
         """Update the peers and their costs in both costmaps.
 
@@ -190,13 +190,13 @@ class PeerCoordinator:
                 unknown.
             peers: All peers with a known pose, however old.
             cruise_mps: Speed at which robots are expected to fly.
-            strangers: Moving obstacles in the frame of the local costmap, None if nothing tracks
+            tracks: Moving obstacles in the frame of the local costmap, None if nothing tracks
                 them.
 
         Returns:
             Messages about peers that were lost or came back, for the log.
         """
-        self._tracks = strangers is not None
+        self._tracks = tracks is not None
         self._tracker.cruise_mps = cruise_mps
         messages = self._tracker.observe(
             now_s,
@@ -207,9 +207,9 @@ class PeerCoordinator:
         )
         messages += self._update_roundabout(now_s, pose, peers)
         if pose is not None and local_from_global is not None:
-            in_map = None if strangers is None else _in_map(strangers, local_from_global)
+            in_map = None if tracks is None else _in_map(tracks, local_from_global)
             self._update_costs(pose, local_from_global)
-            self._observe_strangers(now_s, pose, in_map)
+            self._observe_obstacles(now_s, pose, in_map)
         return messages
 
     def _update_roundabout(
@@ -228,12 +228,12 @@ class PeerCoordinator:
             self._costs.update(pose, local_from_global, self.priority)
         self._has_costs = costs
 
-    def _observe_strangers(self, now_s: float, pose: Pose2D, strangers: Optional[Tracks]) -> None:
-        if strangers is None or not self.params.yield_to_strangers:
+    def _observe_obstacles(self, now_s: float, pose: Pose2D, tracks: Optional[Tracks]) -> None:
+        if tracks is None or not self.params.yield_to_moving_obstacles:
             if self._stand_off.is_watching:
                 self._stand_off.restart()
             return
-        self._stand_off.observe(now_s, pose, strangers.states[:, :2])
+        self._stand_off.observe(now_s, pose, tracks.states[:, :2])
 
     # -- decide --------------------------------------------------------------------------
 
@@ -248,21 +248,21 @@ class PeerCoordinator:
         if goal is None:
             return self._decide_idle(now_s, pose)
         before = self.decision
-        if not self._tracker.peers and before is None and self._stand_off.stranger is None:
+        if not self._tracker.peers and before is None and self._stand_off.obstacle is None:
             return PeerAdvice()
         messages = self._give_up_priority(now_s, pose) if self._tracker.peers or before else ()
-        for_stranger = before if before is not None and before.peer == STRANGER else None
+        for_obstacle = before if before is not None and before.peer == MOVING_OBSTACLE else None
         self.decision = self._rules.decide(
             now_s,
             pose,
             self._path,
             _straight_to(goal),
             self.priority,
-            before if for_stranger is None else None,
+            before if for_obstacle is None else None,
         )
         if self.decision is None:
             self.decision = self._stand_off.decide(
-                now_s, pose, self._path, for_stranger, self.params.stranger_patience_s
+                now_s, pose, self._path, for_obstacle, self.params.moving_obstacle_patience_s
             )
         if self.decision != before:
             messages += (str(self.decision or "path clear, resuming goal"),)

@@ -13,7 +13,7 @@ class PeerParams:
 
     Attributes:
         margin_m: Hulls stay twice as far apart.
-        stranger_patience_s: A random time of up to twice as much is added.
+        moving_obstacle_patience_s: A random time of up to twice as much is added.
     """
 
     avoid_peers: bool = flag(
@@ -31,9 +31,9 @@ class PeerParams:
     roundabouts: bool = flag(
         "roundabouts", True, "Where four robots meet, all keep right of a circle.", upstream=False
     )
-    yield_to_strangers: bool = flag(
-        "yield_to_strangers", False, "Make room for a tracked obstacle in the way.", upstream=False
+    yield_to_moving_obstacles: bool = flag(
+        "yield_to_moving_obstacles", False, "Make room for one that is in the way.", upstream=False
     )
-    stranger_patience_s: float = number(
-        "stranger_patience", 3.0, "seconds", 0.1, 60, "Time until the robot makes room."
+    moving_obstacle_patience_s: float = number(
+        "moving_obstacle_patience", 3.0, "seconds", 0.1, 60, "Time until the robot makes room."
     )

@@ -22,7 +22,7 @@ from quad_nav.geometry import Pose2D
 from quad_nav.peers.peer import Peer
 from quad_nav.peers.predicted_paths import nearest_in_time, sample_path
 
-STRANGER = "a stranger"
+MOVING_OBSTACLE = "a moving obstacle"
 """Name of what moves and has no name, and that a robot makes room for."""
 HORIZON_S = 7.0
 TIME_TOLERANCE_S = 1.5
@@ -56,7 +56,7 @@ class YieldDecision:
 
     def __str__(self) -> str:
         text = f"{self.action.value} {self.peer}"
-        if self.peer != STRANGER:
+        if self.peer != MOVING_OBSTACLE:
             text += " (higher priority)"
         if self.holding_point is None:
             return f"{text} to pass"

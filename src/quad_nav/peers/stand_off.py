@@ -1,10 +1,10 @@
-"""Stand-offs with strangers: two face each other in a narrow passage, and neither says a word.
+"""Stand-offs: a robot and a moving obstacle face each other in a narrow passage.
 
-A stranger is something that moves and tells nothing, as a peer whose link is lost. Where there is
-no room for two, no plan leads past it once it stands, and it may wait for this robot as well. A
-robot that has made no progress for a random time, with a stranger ahead, backs out: it flies to a
-holding point off the way by which it came, and lets the stranger pass. Two robots that do so draw
-different times, so that one of them sees the other leave before its own time is over.
+A moving obstacle tells nothing; it may be a peer whose link is lost. Where there is no room for
+two, no plan leads past it once it stands, and it may wait for this robot as well. A robot that has
+made no progress for a random time, with a moving obstacle ahead, backs out: it flies to a holding
+point off the way by which it came, and lets the obstacle pass. Two robots that do so draw different
+times, so that one of them sees the other leave before its own time is over.
 
 Source: random times to break a tie without a word, as in R. M. Metcalfe, D. R. Boggs, "Ethernet:
 distributed packet switching for local computer networks", Communications of the ACM 19(7), 1976.
@@ -23,15 +23,15 @@ from quad_nav.geometry import Pose2D
 from quad_nav.peers.holding_point import find_holding_point
 from quad_nav.peers.peer import resample
 from quad_nav.peers.peer_tracker import TOLERANCE_M, PeerTracker
-from quad_nav.peers.right_of_way import STRANGER, Yield, YieldDecision
+from quad_nav.peers.right_of_way import MOVING_OBSTACLE, Yield, YieldDecision
 from quad_nav.timing import StallTimer
 
 Floats = NDArray[np.float64]
 
-_REACH_M = 3.0  # distance of strangers that count
-_REMEMBERED_S = 20.0  # for which a stranger that has stopped is still one
+_REACH_M = 3.0  # distance of moving obstacles that count
+_REMEMBERED_S = 20.0  # for which a moving obstacle that has stopped is still one
 _STALL_M = 0.4  # who has moved so far makes progress
-_WAIT_S = (15.0, 30.0)  # at a holding point, for a stranger that does not come
+_WAIT_S = (15.0, 30.0)  # at a holding point, for a moving obstacle that does not come
 _ARRIVED_M = 0.3
 _TRAVEL_S = 30.0  # longest time to the holding point
 _TRAIL_M = 8.0
@@ -39,15 +39,15 @@ _SPACING_M = 0.1
 
 
 class StandOff:
-    """Ends stand-offs of one robot with strangers.
+    """Ends stand-offs of one robot with moving obstacles.
 
     Attributes:
-        stranger: float64[2], place in ``map`` where the nearest stranger was seen last, None if
+        obstacle: float64[2], place in ``map`` where the nearest obstacle was seen last, None if
             there is none.
     """
 
     def __init__(self, tracker: PeerTracker, global_costmap: LayeredCostmap, number: int) -> None:
-        """Begin without strangers.
+        """Begin without moving obstacles.
 
         Args:
             tracker: The peers and their distances.
@@ -61,10 +61,10 @@ class StandOff:
 
     def restart(self) -> None:
         """Forget everything, after a jump of the clock."""
-        self.stranger: Optional[Floats] = None
+        self.obstacle: Optional[Floats] = None
         self._seen_s = -math.inf
         self._trail: List[Tuple[float, float]] = []
-        self._assumed = np.zeros((0, 2))  # path that the stranger is expected to take
+        self._assumed = np.zeros((0, 2))  # path that the obstacle is expected to take
         self._held_at = 0.0  # distance along it at which the robot leaves it
         self._until_s = -math.inf
         self._wait_s = 0.0
@@ -73,7 +73,7 @@ class StandOff:
 
     @property
     def is_watching(self) -> bool:
-        """True if strangers were observed since the last ``restart``."""
+        """True if moving obstacles were observed since the last ``restart``."""
         return bool(self._trail)
 
     def start_goal(self) -> None:
@@ -81,34 +81,34 @@ class StandOff:
         self._stall = StallTimer()
         self._patience_s = math.inf
 
-    def observe(self, now_s: float, pose: Pose2D, strangers: Floats) -> None:
-        """Update the stranger.
+    def observe(self, now_s: float, pose: Pose2D, obstacles: Floats) -> None:
+        """Update the obstacle.
 
         Args:
             now_s: Time of the update.
             pose: Pose of the robot in ``map``.
-            strangers: float64[n, 2], places in ``map`` of what moves now.
+            obstacles: float64[n, 2], places in ``map`` of what moves now.
         """
         at = (pose.x_m, pose.y_m)
         if not self._trail or math.dist(at, self._trail[-1]) >= _SPACING_M:
             self._trail.append(at)
             del self._trail[: -int(_TRAIL_M / _SPACING_M)]
-        near = strangers
-        if len(strangers):
-            near = strangers[np.hypot(*(strangers - at).T) < _REACH_M]
+        near = obstacles
+        if len(obstacles):
+            near = obstacles[np.hypot(*(obstacles - at).T) < _REACH_M]
         if len(near):
-            from_m = np.hypot(*(near - (at if self.stranger is None else self.stranger)).T)
-            self.stranger, self._seen_s = near[int(from_m.argmin())], now_s
-        elif self.stranger is not None and (
+            from_m = np.hypot(*(near - (at if self.obstacle is None else self.obstacle)).T)
+            self.obstacle, self._seen_s = near[int(from_m.argmin())], now_s
+        elif self.obstacle is not None and (
             self._is_known() or now_s > max(self._seen_s + _REMEMBERED_S, self._until_s)
         ):
-            self.stranger = None
+            self.obstacle = None
 
     def _is_known(self) -> bool:
-        """Return whether the stranger is a peer that is heard now."""
+        """Return whether the obstacle is a peer that is heard now."""
         limit_m = self._tracker.min_separation_m
-        return self.stranger is not None and any(
-            math.dist(peer.position, self.stranger) < limit_m for peer in self._tracker.peers
+        return self.obstacle is not None and any(
+            math.dist(peer.position, self.obstacle) < limit_m for peer in self._tracker.peers
         )
 
     def decide(
@@ -119,13 +119,13 @@ class StandOff:
         current: Optional[YieldDecision],
         patience_s: float,
     ) -> Optional[YieldDecision]:
-        """Decide whether to make room for the stranger.
+        """Decide whether to make room for the obstacle.
 
         Args:
             now_s: Time of the decision.
             pose: Pose of the robot in ``map``.
             path: Path that the robot follows, float64[n, 2], metres in ``map``.
-            current: The decision in force, None if the robot does not make room for a stranger.
+            current: The decision in force, None if the robot does not make room for an obstacle.
             patience_s: Shortest time without progress; the longest is three times that.
 
         Returns:
@@ -140,33 +140,33 @@ class StandOff:
             return None
         if self._stall.has_moved(now_s, pose, _STALL_M) or not math.isfinite(self._patience_s):
             self._patience_s = patience_s * (1.0 + 2.0 * self._draw(pose))
-        if self.stranger is None or not _is_ahead(pose, path, self.stranger):
+        if self.obstacle is None or not _is_ahead(pose, path, self.obstacle):
             self._stall.restart(now_s)
         if not self._stall.exceeds(now_s, self._patience_s):
             return None
         self.start_goal()
-        return self._make_room(now_s, pose, self._stranger_path(pose))
+        return self._make_room(now_s, pose, self._obstacle_path(pose))
 
     def _draw(self, pose: Pose2D) -> float:
         """Return a random number below 1, another one for each robot and place."""
         place = [int(1000.0 * abs(value)) for value in (pose.x_m, pose.y_m)]
         return float(np.random.default_rng([self._number, *place]).random())
 
-    def _stranger_path(self, pose: Pose2D) -> Floats:
-        """Return the path by which a stranger passes: to the robot, and on where it came from."""
-        assert self.stranger is not None
-        points = [self.stranger, (pose.x_m, pose.y_m), *self._trail[::-1]]
+    def _obstacle_path(self, pose: Pose2D) -> Floats:
+        """Return the path by which an obstacle passes: to the robot, and on where it came from."""
+        assert self.obstacle is not None
+        points = [self.obstacle, (pose.x_m, pose.y_m), *self._trail[::-1]]
         return resample(np.array(points), _SPACING_M)
 
     def _make_room(self, now_s: float, pose: Pose2D, path: Floats) -> Optional[YieldDecision]:
-        assert self.stranger is not None
+        assert self.obstacle is not None
         separation_m = self._tracker.min_separation_m
         point = find_holding_point(
             self._global.spec,
             self._global.costs,
             pose,
             [path],
-            self.stranger.reshape(1, 2),
+            self.obstacle.reshape(1, 2),
             separation_m + 2.0 * TOLERANCE_M,
         )
         if point is None:
@@ -177,21 +177,21 @@ class StandOff:
         self._wait_s = low_s + (high_s - low_s) * self._draw(pose)
         self._until_s = now_s + _TRAVEL_S + self._wait_s
         self._has_arrived = False
-        return YieldDecision(STRANGER, Yield.MAKE_ROOM, point)
+        return YieldDecision(MOVING_OBSTACLE, Yield.MAKE_ROOM, point)
 
     def _keeps_out(self, now_s: float, pose: Pose2D, point: Optional[Pose2D]) -> bool:
-        """Return whether the stranger has not passed, and may still come."""
+        """Return whether the obstacle has not passed, and may still come."""
         is_there = point is None or pose.distance_to(point) < _ARRIVED_M
         if is_there and not self._has_arrived:
             self._has_arrived = True
             self._until_s = now_s + self._wait_s
-        if self.stranger is None or now_s >= self._until_s:
+        if self.obstacle is None or now_s >= self._until_s:
             return False
-        passed_m = self._distance_along(self.stranger) - self._held_at
+        passed_m = self._distance_along(self.obstacle) - self._held_at
         return passed_m < self._tracker.min_separation_m
 
     def _distance_along(self, place: Floats) -> float:
-        """Return the distance along the stranger's path at which it is nearest to a place."""
+        """Return the distance along the obstacle's path at which it is nearest to a place."""
         return _SPACING_M * int(np.hypot(*(self._assumed - place).T).argmin())
 
 

@@ -22,7 +22,7 @@ from quad_nav.geometry import Pose2D
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.measures import Tracks, resampled_tracks
 from quad_nav.report.scene_drawing import draw_moving, draw_scene, extent
-from quad_nav.report.style import ALARM, colour, styled
+from quad_nav.report.style import ALARM, centred_text, colour, styled
 
 _WIDTH_IN, _DPI = 5.4, 100
 _FRAMES_PER_S = 10
@@ -161,17 +161,7 @@ class _MovingRobot:
         self._goal: Line2D = axes.plot([], [], "o", ms=11, color="none", mec=ink, mew=2, zorder=5)[
             0
         ]
-        self._label = axes.text(
-            0,
-            0,
-            str(number),
-            color=ink,
-            fontsize=9,
-            fontweight="bold",
-            ha="center",
-            va="center_baseline",
-            zorder=8,
-        )
+        self._label = centred_text(axes, (0.0, 0.0), str(number), 9, ink, zorder=8)
 
     def show(self, tracks: Tracks, time_s: float) -> None:
         now = tracks.index_at(time_s) if len(tracks.times_s) else None

@@ -25,6 +25,7 @@ from quad_nav.report.style import (
     ALARM,
     QUIET,
     WIDTH_IN,
+    centred_text,
     colour,
     line_style,
     new_figure,
@@ -182,18 +183,8 @@ def _draw_robot_marks(axes: Axes, marks: Marks, scale: float) -> None:
             mew=style["mew"] * scale,
             zorder=zorder,
         )
-        axes.text(
-            x_m,
-            y_m,
-            text,
-            color="white" if is_full else own,
-            fontsize=7.5 * scale,
-            fontweight="bold",
-            ha="center",
-            va="center_baseline",
-            zorder=zorder + 1,
-            clip_on=True,
-        )
+        ink = "white" if is_full else own
+        centred_text(axes, (x_m, y_m), text, 7.5 * scale, ink, zorder=zorder + 1)
 
 
 def _draw_letters(axes: Axes, found: Sequence[Marks]) -> None:
@@ -272,18 +263,9 @@ def _draw_bar(axes: Axes, series: Bars, bar: Bar, duration_s: float) -> None:
     )
     if length_s > _NARROW * duration_s:
         halo = withStroke(linewidth=4, foreground="white" if bar.is_pale else own)
-        axes.text(
-            bar.begin_s + length_s / 2,
-            bar.y,
-            bar.text,
-            ha="center",
-            va="center_baseline",
-            fontsize=8.5,
-            fontweight="bold",
-            color="black" if bar.is_pale else "white",
-            clip_on=True,
-            path_effects=[halo] if series.is_hatched else [],  # keeps the hatching away
-        )
+        effects = [halo] if series.is_hatched else []  # keeps the hatching away
+        place, ink = (bar.begin_s + length_s / 2, bar.y), "black" if bar.is_pale else "white"
+        centred_text(axes, place, bar.text, 8.5, ink, path_effects=effects)
 
 
 def _bars_symbol(series: Bars) -> Patch:

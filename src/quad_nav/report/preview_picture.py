@@ -20,7 +20,15 @@ from quad_nav.files.output import write_bytes
 from quad_nav.grid import FREE, INSCRIBED, LETHAL, UNKNOWN
 from quad_nav.report import style
 from quad_nav.report.scene_drawing import MOVING, Extent, draw_hull, draw_scene, draw_starting
-from quad_nav.report.style import ALARM, QUIET, WIDTH_IN, colour, new_figure, robot_legend
+from quad_nav.report.style import (
+    ALARM,
+    QUIET,
+    WIDTH_IN,
+    centred_text,
+    colour,
+    new_figure,
+    robot_legend,
+)
 from quad_nav.scenario.preview import MissionPreview, RobotPreview
 
 SUFFIXES = (".png", ".svg", ".html")
@@ -131,7 +139,7 @@ def _draw_robot(axes: Axes, robot: RobotPreview, radius_m: float, scale: float) 
         here = np.array([robot.start.x_m, robot.start.y_m])
         draw_hull(axes, number, here, robot.start.yaw_rad, radius_m)
         axes.plot(*here, "s", ms=12 * scale, color=tint, mec="white", zorder=8)
-        _text(axes, (here[0], here[1]), str(number), 7.5 * scale, "white")
+        centred_text(axes, (here[0], here[1]), str(number), 7.5 * scale, "white", zorder=10)
         stops.insert(0, (robot.start.x_m, robot.start.y_m))
     axes.plot(*np.transpose(stops), color=tint, lw=1.0 * scale, ls=(0, (2, 2)), zorder=4)
     for plan in robot.plans:
@@ -156,7 +164,7 @@ def _draw_goal(
         axes.annotate("", place, ahead, textcoords="offset points", arrowprops=arrow, zorder=8)
     face = "white" if fault else tint
     axes.plot(*place, "o", ms=15 * scale, color=face, mec=tint, mew=1.8 * scale, zorder=9)
-    _text(axes, place, str(index + 1), 9 * scale, tint if fault else "white")
+    centred_text(axes, place, str(index + 1), 9 * scale, tint if fault else "white", zorder=10)
     if fault:
         is_left = place[0] < sum(axes.get_xlim()) / 2
         axes.annotate(
@@ -171,20 +179,6 @@ def _draw_goal(
             zorder=12,
             annotation_clip=True,
         )
-
-
-def _text(axes: Axes, place: Tuple[float, float], text: str, size: float, ink: Any) -> None:
-    axes.text(
-        *place,
-        text,
-        color=ink,
-        fontsize=size,
-        fontweight="bold",
-        ha="center",
-        va="center_baseline",
-        zorder=10,
-        clip_on=True,
-    )
 
 
 def _symbols(costmap: Optional[LayeredCostmap], has_faults: bool, has_moving: bool) -> List[Any]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from quad_nav.geometry import Pose2D
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.measures import Tracks
-from quad_nav.report.style import colour
+from quad_nav.report.style import centred_text, colour
 from quad_nav.sim.movers import Motions
 from quad_nav.sim.scene import Box, Obstacle, Scene
 
@@ -219,19 +219,5 @@ def draw_hull(
         solid_capstyle="round",
     )
     if numbered:
-        _draw_number(axes, robot, position_m - 0.5 * ahead)
-
-
-def _draw_number(axes: Axes, robot: int, position_m: NDArray[np.float64]) -> None:
-    axes.text(
-        position_m[0],
-        position_m[1],
-        str(robot),
-        fontsize=6.5,
-        fontweight="bold",
-        color=colour(robot),
-        ha="center",
-        va="center_baseline",
-        zorder=9,
-        clip_on=True,
-    )
+        x_m, y_m = position_m - 0.5 * ahead
+        centred_text(axes, (x_m, y_m), str(robot), 6.5, colour(robot), zorder=9)

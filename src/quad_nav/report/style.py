@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from quad_nav.report.plot import DASHES
@@ -112,6 +113,23 @@ def colour(robot: int) -> Tuple[float, float, float]:
 def line_style(robot: int) -> Any:
     """Return a robot's line pattern, the one of interactive plots."""
     return _LINE_STYLES[DASHES[robot % len(DASHES)]]
+
+
+def centred_text(
+    axes: Axes, place: Tuple[float, float], text: str, size: float, ink: Any, **more: Any
+) -> Text:
+    """Write a short bold text in the middle of a symbol; ``more`` are options of matplotlib."""
+    return axes.text(
+        *place,
+        text,
+        fontsize=size,
+        color=ink,
+        fontweight="bold",
+        ha="center",
+        va="center_baseline",
+        clip_on=True,
+        **more,
+    )
 
 
 def robot_legend(

@@ -1,4 +1,4 @@
-"""Stand-offs with strangers in a corridor of 1.2 m along x, between y = 4.4 m and y = 5.6 m.
+"""Stand-offs with moving obstacles in a corridor of 1.2 m along x, between y = 4.4 m and y = 5.6 m.
 
 The robots' safety radius is 0.35 m and the margin 0, so that centres keep 0.8 m and holding points
 1.0 m. Cells are 0.1 m.
@@ -16,7 +16,7 @@ from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL
 from quad_nav.peers.peer import Peer
-from quad_nav.peers.right_of_way import STRANGER, Yield
+from quad_nav.peers.right_of_way import MOVING_OBSTACLE, Yield
 from quad_nav.peers.stand_off import StandOff
 from quad_nav.scenario.assembly import build_navigator
 
@@ -43,19 +43,19 @@ def stand_off(coordinator) -> StandOff:
     return coordinator._stand_off
 
 
-def come(stand_off: StandOff, stranger=(5.5, 5.0)) -> Pose2D:
-    """Fly from (1, 5) to (4, 5) in 30 s, and see a stranger."""
+def come(stand_off: StandOff, obstacle=(5.5, 5.0)) -> Pose2D:
+    """Fly from (1, 5) to (4, 5) in 30 s, and see a moving obstacle."""
     for k in range(31):
         pose = Pose2D(1.0 + 0.1 * k, 5.0)
-        stand_off.observe(float(k), pose, np.array([stranger]))
+        stand_off.observe(float(k), pose, np.array([obstacle]))
         assert stand_off.decide(float(k), pose, GOAL_PATH, None, PATIENCE_S) is None
     return pose
 
 
-def wait(stand_off: StandOff, pose: Pose2D, strangers: np.ndarray, seconds: int = 20):
+def wait(stand_off: StandOff, pose: Pose2D, obstacles: np.ndarray, seconds: int = 20):
     """Stand; return the decision, and the seconds until it."""
     for k in range(1, seconds + 1):
-        stand_off.observe(30.0 + k, pose, strangers)
+        stand_off.observe(30.0 + k, pose, obstacles)
         decision = stand_off.decide(30.0 + k, pose, GOAL_PATH, None, PATIENCE_S)
         if decision is not None:
             return decision, k
@@ -67,13 +67,13 @@ NOBODY = np.zeros((0, 2))
 
 def test_a_blocked_robot_backs_out_of_the_corridor_within_nine_seconds(stand_off) -> None:
     decision, seconds = wait(stand_off, come(stand_off), NOBODY)
-    assert decision.peer == STRANGER and decision.action is Yield.MAKE_ROOM
+    assert decision.peer == MOVING_OBSTACLE and decision.action is Yield.MAKE_ROOM
     # A patience of 3 to 9 s, checked once per second.
     assert seconds <= 10
     point = decision.holding_point
     assert point.x_m < 3.0
     assert abs(point.y_m - 5.0) >= 1.0 - 0.1
-    assert str(decision).startswith("making room for a stranger at (")
+    assert str(decision).startswith("making room for a moving obstacle at (")
 
 
 def test_two_robots_at_the_same_place_have_different_patience(coordinator) -> None:
@@ -86,29 +86,29 @@ def test_two_robots_at_the_same_place_have_different_patience(coordinator) -> No
     assert all(0.0 <= draw < 1.0 for draw in draws)
 
 
-def test_a_robot_without_a_stranger_ahead_stays(stand_off) -> None:
-    assert wait(stand_off, come(stand_off, stranger=(2.0, 6.0)), NOBODY)[0] is None
+def test_a_robot_without_a_obstacle_ahead_stays(stand_off) -> None:
+    assert wait(stand_off, come(stand_off, obstacle=(2.0, 6.0)), NOBODY)[0] is None
     far = np.array([[7.5, 5.0]])  # 3.5 m away
     stand_off.restart()
     assert wait(stand_off, Pose2D(4.0, 5.0), far)[0] is None
 
 
-def test_a_stranger_that_was_not_seen_for_20_s_is_forgotten(stand_off) -> None:
+def test_a_obstacle_that_was_not_seen_for_20_s_is_forgotten(stand_off) -> None:
     pose = come(stand_off)
     stand_off.observe(49.0, pose, NOBODY)
-    assert stand_off.stranger.tolist() == [5.5, 5.0]
+    assert stand_off.obstacle.tolist() == [5.5, 5.0]
     stand_off.observe(51.0, pose, NOBODY)
-    assert stand_off.stranger is None
+    assert stand_off.obstacle is None
 
 
-def test_a_stranger_that_is_heard_as_a_peer_is_none(stand_off, coordinator) -> None:
+def test_a_obstacle_that_is_heard_as_a_peer_is_none(stand_off, coordinator) -> None:
     pose = come(stand_off)
     coordinator._tracker.peers = [Peer("quad1", 5.0, 5.0, 0.0, 0.0, 31.0)]  # 0.5 m beside
     stand_off.observe(31.0, pose, NOBODY)
-    assert stand_off.stranger is None
+    assert stand_off.obstacle is None
 
 
-def test_it_goes_on_when_the_stranger_has_passed(stand_off) -> None:
+def test_it_goes_on_when_the_obstacle_has_passed(stand_off) -> None:
     decision, seconds = wait(stand_off, come(stand_off), NOBODY)
     point, now_s = decision.holding_point, 30.0 + seconds
 
@@ -139,15 +139,21 @@ def test_it_waits_at_the_holding_point_for_15_to_30_s(stand_off) -> None:
 
 def test_the_switch_is_off_by_default() -> None:
     peers = build_navigator(load({**TREE, "robot": 0})).peers
-    assert not peers.params.yield_to_strangers
+    assert not peers.params.yield_to_moving_obstacles
     on = build_navigator(
-        load({**TREE, "robot": 0, "peers": {"yield_to_strangers": True, "stranger_patience": 2.5}})
+        load(
+            {
+                **TREE,
+                "robot": 0,
+                "peers": {"yield_to_moving_obstacles": True, "moving_obstacle_patience": 2.5},
+            }
+        )
     ).peers
-    assert on.params.yield_to_strangers
-    assert math.isclose(on.params.stranger_patience_s, 2.5)
+    assert on.params.yield_to_moving_obstacles
+    assert math.isclose(on.params.moving_obstacle_patience_s, 2.5)
 
 
-def test_a_peer_that_went_silent_keeps_its_cell_for_a_second_where_strangers_are_tracked(
+def test_a_peer_that_went_silent_keeps_its_cell_for_a_second_where_obstacles_are_tracked(
     coordinator,
 ) -> None:
     """It was 2 m ahead at 0 s, and came nearer at 0.5 m/s; ``peer_timeout`` is 0.5 s."""

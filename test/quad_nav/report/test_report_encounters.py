@@ -74,16 +74,16 @@ def test_contacts_with_obstacles_come_first_and_the_closest_next():
     assert [one.names for one in found[2:]] == [("quad0", "quad2"), ("quad0", "quad1")]
 
 
-@pytest.mark.parametrize("offset_m, gap_m", [(0.62, 0.0), (0.58, 0.0)])
-def test_those_that_touched_have_no_gap(offset_m, gap_m):
+@pytest.mark.parametrize("offset_m", [0.62, 0.58])
+def test_those_that_touched_have_no_gap(offset_m):
     """They may have touched between two poses, also of a body that is no disc."""
     trace = passing(offset_m)
     touch = flight(*trace.robots, contacts=[Contact(5.01, "quad1", "quad0", 3.5, 2.3)])
     (apart,), (one,) = found_in(trace), found_in(touch)
     assert apart.separation_m == pytest.approx(offset_m - 0.6)
-    assert one.separation_m == pytest.approx(gap_m)
+    assert one.separation_m == 0.0
     picture = encounter_picture(touch, resampled_tracks(touch), one)
-    assert picture.axes[2].get_xlabel() == separation_text(gap_m)
+    assert picture.axes[2].get_xlabel() == "touching"
 
 
 def test_the_legend_of_paths_shows_the_letter():
@@ -102,19 +102,16 @@ def test_a_single_robot_has_no_encounters():
     assert found_in(flight()) == ()
 
 
-def test_frames_are_a_way_of_45_cm_apart():
-    trace = passing(1.0)
+@pytest.mark.parametrize(
+    "trace, times_s",
+    [
+        (passing(1.0), [3.2, 4.1, 5.0, 5.9, 6.8]),
+        (flight(robot(0, (1.0, 1.0)), robot(1, (2.0, 1.0))), [0.0, 1.5, 3.0]),  # they stand
+    ],
+)
+def test_frames_are_a_way_of_45_cm_apart_or_1_5_s(trace, times_s):
     (one,) = found_in(trace)
-    assert frame_times(trace, resampled_tracks(trace), one) == pytest.approx(
-        [3.2, 4.1, 5.0, 5.9, 6.8]
-    )
-
-
-def test_frames_of_those_that_stand_and_at_the_begin():
-    trace = flight(robot(0, (1.0, 1.0)), robot(1, (2.0, 1.0)))
-    (one,) = found_in(trace)
-    assert one.time_s == 0.0
-    assert frame_times(trace, resampled_tracks(trace), one) == pytest.approx([0.0, 1.5, 3.0])
+    assert frame_times(trace, resampled_tracks(trace), one) == pytest.approx(times_s)
 
 
 @pytest.mark.parametrize(

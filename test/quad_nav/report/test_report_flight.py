@@ -48,20 +48,9 @@ def test_metrics_are_those_of_the_summary():
 
 def test_quad_fly_writes_report_and_animation(tmp_path):
     report, animation = tmp_path / "new" / "flight.html", tmp_path / "flight.gif"
+    words = "fly --time-limit 0.5 --beams 64 --quiet".split()
     result = CliRunner().invoke(
-        main,
-        [
-            "fly",
-            "--time-limit",
-            "0.5",
-            "--beams",
-            "64",
-            "--quiet",
-            "--report",
-            str(report),
-            "--animate",
-            str(animation),
-        ],
+        main, [*words, "--report", str(report), "--animate", str(animation)]
     )
     assert result.exit_code == 1  # half a second is too short for any goal
     assert result.output == ""  # the names of the files are left out, too

@@ -33,15 +33,10 @@ def test_gap_between_two_that_meet_head_on():
     assert gaps_m[1] == pytest.approx(gaps_m[0])
 
 
-def test_gap_is_to_the_nearest_of_three():
-    tracks = resampled_tracks(
-        flight(robot(0, (1.0, 1.0)), robot(1, (4.0, 1.0)), robot(2, (6.0, 1.0)))
-    )
-    assert separations_m(tracks, RADIUS_M)[:, 0] == pytest.approx([2.4, 1.4, 1.4])
-
-
-def test_alone_there_is_no_gap():
-    assert np.isnan(separations_m(resampled_tracks(flight(robot(0, (1.0, 1.0)))), RADIUS_M)).all()
+@pytest.mark.parametrize("x_m, gaps_m", [([1.0, 4.0, 6.0], [2.4, 1.4, 1.4]), ([1.0], [math.nan])])
+def test_gap_is_to_the_nearest_other_robot(x_m, gaps_m):
+    tracks = resampled_tracks(flight(*(robot(k, (x, 1.0)) for k, x in enumerate(x_m))))
+    assert separations_m(tracks, RADIUS_M)[:, 0] == pytest.approx(gaps_m, nan_ok=True)
 
 
 def test_clearance_is_to_the_pillar_or_a_wall():
@@ -77,18 +72,19 @@ def test_speed_and_tilt():
     assert tilt_rad(leaning.quaternions) == pytest.approx(np.full(401, 0.2))
 
 
-def test_spins_count_while_a_goal_is_flown():
-    spinning = robot(0, (1.0, 1.0), turn_radps=0.5, goals=(goal(0, (1.0, 1.0), 2.0, 6.0),))
-    assert spins(spinning) == [(pytest.approx(2.0), pytest.approx(6.0))]
-    assert spins(robot(0, (1.0, 1.0), turn_radps=0.5)) == []
-
-
-@pytest.mark.parametrize("velocity, turn_radps", [((0.1, 0.0), 0.5), ((0.0, 0.0), 0.1)])
-def test_flying_or_standing_is_no_spin(velocity, turn_radps):
-    assert (
-        spins(robot(0, (1.0, 1.0), velocity, turn_radps, goals=(goal(0, (1.0, 1.0), 0.0, 10.0),)))
-        == []
-    )
+@pytest.mark.parametrize(
+    "velocity, turn_radps, has_goal, expected",
+    [
+        ((0.0, 0.0), 0.5, True, [(2.0, 6.0)]),
+        ((0.0, 0.0), 0.5, False, []),
+        ((0.1, 0.0), 0.5, True, []),  # it flies
+        ((0.0, 0.0), 0.1, True, []),  # it stands
+    ],
+)
+def test_spins_count_while_a_goal_is_flown(velocity, turn_radps, has_goal, expected):
+    goals = (goal(0, (1.0, 1.0), 2.0, 6.0),) if has_goal else ()
+    found = spins(robot(0, (1.0, 1.0), velocity, turn_radps, goals=goals))
+    assert found == [pytest.approx(span) for span in expected]
 
 
 def test_runs():
