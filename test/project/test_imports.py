@@ -67,6 +67,7 @@ PLACES = {
     "defusedxml": "quad_nav/files/xml_tree.py",
     "rospy": ROS,
     "rosgraph": ROS,
+    "roslib": ROS,
     "actionlib": ROS,
     "dynamic_reconfigure": ROS,
     "tf2_ros": ROS,

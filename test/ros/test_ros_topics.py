@@ -35,7 +35,6 @@ TYPES = {
     "/move_base{i}/local_costmap/footprint": "geometry_msgs/PolygonStamped",
     "/move_base{i}/state": "std_msgs/String",
     "/move_base{i}/right_of_way": "quad/RightOfWay",
-    "/quad/events": "quad/MissionEvent",
     "/quad/flight": "quad/FlightInfo",
     "/simulation/contacts": "quad/Contact",
     "/move_base{i}/parameter_descriptions": "dynamic_reconfigure/ConfigDescription",
@@ -81,7 +80,7 @@ class RosTopics(FlightCase):
         cls.start()
 
     def test_every_topic_and_service_has_its_type(self):
-        self.wait(lambda: not absent((0, 1)), "every topic, subscription and service")
+        self.wait(lambda: not absent((0, 1)), lambda: f"{absent((0, 1))} with their types")
         for i in (0, 1):
             for name, kind in names_of(SERVICES, i).items():
                 self.assertEqual(rosservice.get_service_type(name), kind, name)

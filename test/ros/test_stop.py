@@ -52,7 +52,7 @@ class Stop(FlightCase):
         self.assertLess(max(self.speed(0), self.speed(1)), 0.05)
         self.assertIn("resumed", trigger("/mission/resume"))
         self.wait(lambda: min(self.speed(0), self.speed(1)) > 0.2, "both flying again")
-        goals = [(one["robot"], one["goal"], one["attempt"]) for one in self.sent()[count:]]
+        goals = [(one.robot, one.goal, one.attempts) for one in self.sent()[count:]]
         self.assertEqual(sorted(goals[:2]), [(0, 0, 1), (1, 0, 1)])
 
     def kill_sequencer(self):

@@ -57,7 +57,8 @@ MAX_DRIFT = 1.0
 )
 @click.option(
     "--seed",
-    type=click.IntRange(min=0),
+    type=click.IntRange(0, 2**63 - 1),  # scenario.rules.MAX_SEED, whose module loads numpy
+    metavar="N",
     default=0,
     show_default=True,
     help="Seed of jitter, noise, drift and random missions; the same seed gives the same flight.",

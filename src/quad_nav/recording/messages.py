@@ -149,8 +149,11 @@ def planar_pose(at: Pose2D, z_m: float = 0.0) -> Pose3D:
 
 
 def stamped(kind: str, fields: Mapping[str, Any], stamp: int, frame: str = "map") -> Any:
-    """Build a message of a type with a header from its other fields."""
-    return _message_class(kind)(header=header(frame, stamp), **fields)
+    """Build a message of a type from its fields; its header, if it has one, gets the stamp."""
+    made = _message_class(kind)
+    if "header" in made.__dataclass_fields__:
+        return made(header=header(frame, stamp), **fields)
+    return made(**fields)
 
 
 def flight_info(info: FlightInfo) -> Any:

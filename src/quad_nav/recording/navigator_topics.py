@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, Optional, Tuple
+from typing import Any, Dict, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,13 @@ from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.footprint import oriented
 from quad_nav.geometry import Pose2D
 from quad_nav.loop.navigator_group import LoopRobot
-from quad_nav.navigator.tick import RecoveryStart, RobotPoses, State, Tick
+from quad_nav.navigator.tick import RecoveryStart, RobotPoses, Tick
 from quad_nav.recording import messages
 from quad_nav.recording.action_topics import ActionTopics
 from quad_nav.recording.messages import plan_bytes
 from quad_nav.recording.record_file import TopicWriter, stamp_at
 from quad_nav.topics.publishing import CostmapSchedule
-from quad_nav.topics.right_of_way import RightOfWaySchedule
+from quad_nav.topics.robot_topics import RobotTopicSchedule
 from quad_nav.topics.tracked_obstacles import MARKERS_TOPIC, TrackSchedule, track_markers
 
 _NO_PLAN = np.zeros((0, 3))
@@ -40,8 +40,7 @@ class NavigatorTopics:
         self._command_topic = f"/cmd_vel{robot}"
         self._planner = plugin_name(navigator.params.base_global_planner)
         self._controller = plugin_name(navigator.params.base_local_planner)
-        self._state: Optional[State] = None
-        self._right_of_way = RightOfWaySchedule()
+        self._schedule = RobotTopicSchedule()
         self._costmaps: Dict[str, Tuple[LayeredCostmap, CostmapSchedule]] = {
             name: (costmap, CostmapSchedule(costmap))
             for name, costmap in (
@@ -60,10 +59,9 @@ class NavigatorTopics:
         """
         stamp = stamp_at(tick.now_s)
         assert poses.in_global is not None and poses.in_local is not None
-        if tick.state is not self._state:
-            self._state = tick.state
-            self._write("state", stamp, messages.text(tick.state.value), latched=True)
-        self._write_right_of_way(tick, stamp)
+        for topic, fields in self._schedule.pop(tick):
+            content = messages.stamped(topic.kind, fields, stamp)
+            self._write(topic.name, stamp, content, latched=True)
         self._write_obstacles(tick.now_s, stamp)
         if tick.command is not None:
             self._topics.write(
@@ -79,12 +77,6 @@ class NavigatorTopics:
             self._write_costmap(name, window, pose_of[name], tick.now_s)
         if tick.outcome is not None:
             self.action.finish(tick.now_s, tick.outcome)
-
-    def _write_right_of_way(self, tick: Tick, stamp: int) -> None:
-        changed = self._right_of_way.pop(tick)
-        if changed is not None:
-            content = messages.stamped("quad/RightOfWay", changed.fields, stamp)
-            self._write("right_of_way", stamp, content, latched=True)
 
     def _write_obstacles(self, now_s: float, stamp: int) -> None:
         tracks = self._tracks.pop(now_s, self._scan_filters.tracks(now_s))

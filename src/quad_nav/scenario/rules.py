@@ -26,6 +26,8 @@ START_S = 1.0
 MAX_SIZE_M = 250  # a larger random arena takes minutes to fill with obstacles
 MAX_ROBOTS = 100
 """Each has costmaps of its own: a thousand need more memory than most machines have."""
+MAX_SEED = 2**63 - 1
+"""Recordings hold the seed as an int64."""
 
 
 def steps_per_scan(scans_per_s: float) -> int:
@@ -70,7 +72,7 @@ RULES: Dict[str, Rule] = {
     "body_radius": number(above=0, unit="metres"),
     "map_resolution": number(at_least=0, unit="metres"),
     "robots": whole(at_least=1, at_most=MAX_ROBOTS),
-    "seed": whole(at_least=0),
+    "seed": whole(at_least=0, at_most=MAX_SEED),
     "size": Rule(
         number(at_least=0, at_most=MAX_SIZE_M).accepts,
         f"a number of metres, 0 to {MAX_SIZE_M}; 0 has room for all robots",

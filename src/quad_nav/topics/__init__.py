@@ -4,6 +4,7 @@ Each shell converts these plain objects into its own message classes. Those of o
 `fields`, which both shells give to the class of the message.
 
 Reading order: `flight_info`, `mission_events`, `contacts` and `right_of_way` (our own messages),
+`robot_topics` (one row for each topic that a navigator publishes at a change),
 `markers` (scene, quadcopters and goals), `publishing` (what to publish of costmaps and paths, and
 when), `health` (diagnostics), `validation` (accept or reject incoming messages), `rviz_file` (the
 RViz configuration), `goal_routing` (who gets a goal of the fleet), `vehicle_states` (what a real

@@ -1,7 +1,6 @@
 """What a robot does for its peers, as `/move_base{i}/right_of_way` tells it.
 
-The topic holds one latched ``quad/RightOfWay``, published on each change. This module has its
-fields and decides when it changes.
+The topic holds one latched ``quad/RightOfWay``; this module has its fields.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any, Dict, Optional, Tuple
 
 from quad_nav.geometry import Pose2D
-from quad_nav.navigator.tick import Tick
 from quad_nav.peers.right_of_way import Yield, YieldDecision
 from quad_nav.topics.validation import MAX_FRAME_ID, MAX_MAGNITUDE, shown_text
 
@@ -67,35 +65,21 @@ class RightOfWay:
         return YieldDecision(self.peer, action, self.hold_m and Pose2D(*self.hold_m))
 
 
-class RightOfWaySchedule:
-    """Tells when a robot's right of way has changed."""
+def right_of_way(yielding: Optional[YieldDecision], limited_by: str) -> RightOfWay:
+    """Return the right of way of a robot.
 
-    def __init__(self) -> None:
-        """Start with nothing published."""
-        self._published: Optional[RightOfWay] = None
-        self._limited_by = ""
-
-    def pop(self, tick: Tick) -> Optional[RightOfWay]:
-        """Return the right of way of a tick if it is another one than before, else None."""
-        if tick.command is not None:
-            self._limited_by = tick.limited_by
-        present = _of(tick, self._limited_by)
-        if present == self._published:
-            return None
-        self._published = present
-        return present
-
-
-def _of(tick: Tick, limited_by: str) -> RightOfWay:
-    decision = tick.yielding
-    if decision is None:
+    Args:
+        yielding: Its decision to yield; None without one.
+        limited_by: Name of the robot that limits its command, "" if none does.
+    """
+    if yielding is None:
         if not limited_by:
             return RightOfWay()
         return RightOfWay(Kind.LIMITED, limited_by, None, limited_by, f"limited by {limited_by}")
-    point = decision.holding_point
+    point = yielding.holding_point
     hold_m = None if point is None else (float(point.x_m), float(point.y_m))
-    kind = _KIND_OF[decision.action]
-    return RightOfWay(kind, decision.peer, hold_m, limited_by, str(decision))
+    kind = _KIND_OF[yielding.action]
+    return RightOfWay(kind, yielding.peer, hold_m, limited_by, str(yielding))
 
 
 def right_of_way_from_message(message: Any) -> RightOfWay:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Callable, Mapping
+from typing import Any, Mapping
 
 from quad.msg import Contact, FlightInfo, RobotInfo
 from std_msgs.msg import Header
@@ -13,11 +13,11 @@ from quad_nav.topics import flight_info
 from quad_nav.topics.contacts import contact_fields
 
 
-def stamped(
-    kind: Callable[..., Any], fields: Mapping[str, Any], time_s: float, frame: str = "map"
-) -> Any:
-    """Build a message with a header from its other fields."""
-    return kind(header=Header(0, time_message(time_s), frame), **fields)
+def stamped(kind: Any, fields: Mapping[str, Any], time_s: float, frame: str = "map") -> Any:
+    """Build a message from its fields; its header, if it has one, gets the stamp."""
+    if "header" in kind.__slots__:
+        return kind(header=Header(0, time_message(time_s), frame), **fields)
+    return kind(**fields)
 
 
 def contact_message(contact: contacts.Contact, time_s: float) -> Contact:

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Optional
-
 import numpy as np
 import rospy
 from geometry_msgs.msg import Twist
 from move_base_msgs.msg import RecoveryStatus
 from nav_msgs.msg import OccupancyGrid, Path
-from quad.msg import RightOfWay as RightOfWayMessage
+from roslib.message import get_message_class
 from sensor_msgs.msg import PointCloud2
-from std_msgs.msg import String
 
 from quad_nav.config.plugins import plugin_name
 from quad_nav.control.controller import Control
 from quad_nav.geometry import Pose3D
 from quad_nav.navigator.navigator import Navigator
-from quad_nav.navigator.tick import State, Tick
+from quad_nav.navigator.tick import Tick
 from quad_nav.plan.global_planner import SearchPlanner
 from quad_nav.plan.navfn import Navfn
 from quad_nav.ros.common.conversions import time_message, twist_message
@@ -29,7 +26,7 @@ from quad_nav.ros.common.nav_messages import (
 )
 from quad_nav.ros.common.own_messages import stamped
 from quad_nav.topics.publishing import Names, own_node
-from quad_nav.topics.right_of_way import RightOfWay, RightOfWaySchedule
+from quad_nav.topics.robot_topics import ROBOT_TOPICS, RobotTopicSchedule
 
 
 class PlanTopics:
@@ -50,12 +47,13 @@ class PlanTopics:
         self._global_plan = rospy.Publisher(f"{of_controller}/global_plan", Path, queue_size=1)
         self._local_plan = rospy.Publisher(f"{of_controller}/local_plan", Path, queue_size=1)
         self._cost_cloud = rospy.Publisher(f"{of_controller}/cost_cloud", PointCloud2, queue_size=1)
-        self._state = rospy.Publisher(names("~state"), String, queue_size=10, latch=True)
-        self._published_state: Optional[State] = None
-        self._right_of_way = rospy.Publisher(
-            names("~right_of_way"), RightOfWayMessage, queue_size=10, latch=True
-        )
-        self._right_of_way_schedule = RightOfWaySchedule()
+        self._schedule = RobotTopicSchedule()
+        self._of_robot = {
+            topic.name: rospy.Publisher(
+                names(f"~{topic.name}"), get_message_class(topic.kind), queue_size=10, latch=True
+            )
+            for topic in ROBOT_TOPICS
+        }
         self._recovery = rospy.Publisher(
             names("move_base/recovery_status"), RecoveryStatus, queue_size=1
         )
@@ -71,10 +69,9 @@ class PlanTopics:
     def publish(self, tick: Tick, pose: Pose3D) -> None:
         """Publish the results of a tick; `pose` is the robot's in the global frame."""
         now = time_message(tick.now_s)
-        if tick.state is not self._published_state:
-            self._published_state = tick.state
-            self._state.publish(tick.state.value)
-        self._publish_right_of_way(self._right_of_way_schedule.pop(tick), tick.now_s)
+        for topic, fields in self._schedule.pop(tick):
+            publisher = self._of_robot[topic.name]
+            publisher.publish(stamped(publisher.data_class, fields, tick.now_s))
         if tick.command is not None:
             self._command.publish(twist_message(tick.command))
         if tick.plan is not None:
@@ -94,11 +91,6 @@ class PlanTopics:
             )
         if tick.control is not None:
             self._publish_control(tick.control, now)
-
-    def _publish_right_of_way(self, changed: Optional[RightOfWay], now_s: float) -> None:
-        if changed is not None:
-            message = stamped(RightOfWayMessage, changed.fields, now_s)
-            self._right_of_way.publish(message)
 
     def publish_plan(self, plan: np.ndarray, now: rospy.Time) -> None:
         """Publish a plan.
