@@ -27,7 +27,7 @@ fly: workspace  ## Fly the mission: make fly ARGS="config:=tutorial rate:=2"
 test: workspace unit unit38 web lint docs rostest first-hour  ## Run every test and static check
 	@echo "quad: all tests passed"
 
-unit: venv  ## The unit tests
+unit: workspace  ## The unit tests
 	@scripts/make_venv .venv requirements-test.txt requirements-web.txt
 	$(PYTHON) -m pytest -n auto --dist loadfile
 

@@ -17,22 +17,18 @@ from numpy.typing import NDArray
 
 from quad_moving.discs_kernel import fit_disc, outline_clusters
 from quad_moving.earlier_scans import ScanView
-from quad_moving.moving_points import RANGE_NOISE_M, ScanClusters
+from quad_moving.moving_points import NOISE_M, ScanClusters
 
 Floats = NDArray[np.float64]
 
 FIRST_RADIUS_M = 0.3
 """Radius of an obstacle that was never in full view: a person."""
 MIN_RADIUS_M = 0.05
-_EDGE_JUMP_M = 0.1
-_SHAPE_NOISE_M = 0.01  # of outlines that are no circles
-_PART_M, _NEVER_WHOLE_M = 0.1, 0.25
-_EDGE_BEAMS = 0.4
-_POSE_NOISE_M = 0.02  # of the LIDAR
-_GUESS_M = 0.3
-_UNKNOWN_RADIUS_M = 0.15  # standard deviation of ``FIRST_RADIUS_M``
-_SLOWEST = 0.05  # weight of a new view of an obstacle that is known for long
-_SHRINK = 0.98  # of the reach beyond the radius, for each view
+"""Thinner things are hit by fewer than three beams from some metres on."""
+EDGE_M = 0.1
+"""What is farther by so much is behind an edge; the centre of a part in view is as uncertain."""
+_EDGE_BEAMS = 0.4  # an edge is between two beams: 1 / sqrt(12) for each of two edges
+_SLOWEST = 0.05  # weight of a new view of an obstacle that is known for long: the last 20 count
 
 
 @dataclass(frozen=True)
@@ -82,7 +78,7 @@ class Radius:
 
     def hold(self, farthest_m: float) -> None:
         """Take the distance of the farthest point of a view from the fitted centre."""
-        beyond_m = max(self.reach_m - self.circle_m, 0.0) * _SHRINK
+        beyond_m = max(self.reach_m - self.circle_m, 0.0) * (1.0 - _SLOWEST)
         self.reach_m = max(self.circle_m + beyond_m, farthest_m)
 
 
@@ -106,7 +102,7 @@ class DiscFit:
 def outlines(clusters: ScanClusters) -> Outlines:
     """Return the first guesses of the discs of a scan's clusters."""
     rows = np.empty((len(clusters.rows), 5))
-    outline_clusters(clusters.view, clusters.points, clusters.rows, len(rows), _EDGE_JUMP_M, rows)
+    outline_clusters(clusters.view, clusters.points, clusters.rows, len(rows), EDGE_M, rows)
     return Outlines(rows[:, :2].copy(), rows[:, 2].copy(), rows[:, 3] > 1.5, rows[:, 4].copy())
 
 
@@ -149,15 +145,16 @@ def _fit(
 ) -> DiscFit:
     """Fit a disc to a part of the points: the first one, and their number."""
     fitted = np.empty(6)
-    noise_m = math.hypot(RANGE_NOISE_M, _SHAPE_NOISE_M)
-    fit_disc(points, *part, guess, radius.circle_m, noise_m, _GUESS_M, fitted)
+    fit_disc(points, *part, guess, radius.circle_m, NOISE_M, FIRST_RADIUS_M, fitted)
     x, y, xx, yy, xy, farthest_m = fitted.tolist()
     away_x, away_y = x - float(view.origin[0]), y - float(view.origin[1])
     distance_m = max(float(np.hypot(away_x, away_y)), 1e-6)
     away_x, away_y = away_x / distance_m, away_y / distance_m
     spacing_m = distance_m * abs(view.increment)
-    depth_m = _UNKNOWN_RADIUS_M if not radius.views else 0.5 * spacing_m / math.sqrt(radius.views)
-    depth, pose = depth_m**2, _POSE_NOISE_M**2
+    depth_m = (
+        0.5 * FIRST_RADIUS_M if not radius.views else 0.5 * spacing_m / math.sqrt(radius.views)
+    )
+    depth, pose = depth_m**2, NOISE_M**2
     xx, yy = xx + depth * (away_x * away_x) + pose, yy + depth * (away_y * away_y) + pose
     xy += depth * (away_x * away_y)
     noise = np.array([[xx, xy], [xy, yy]])
@@ -170,5 +167,5 @@ def _bias(spacing_m: float, radius: Radius, is_whole: bool) -> float:
     Edges are known to a part of the beams' spacing; of a part in view, neither the centre across
     the line of sight nor, before the first full view, the radius is known.
     """
-    part_m = 0.0 if is_whole else _PART_M if radius.views else _NEVER_WHOLE_M
-    return math.sqrt(_POSE_NOISE_M**2 + (_EDGE_BEAMS * spacing_m) ** 2 + part_m**2)
+    part_m = 0.0 if is_whole else EDGE_M if radius.views else FIRST_RADIUS_M
+    return math.sqrt(NOISE_M**2 + (_EDGE_BEAMS * spacing_m) ** 2 + part_m**2)

@@ -15,10 +15,11 @@ from quad_nav.files.kernel_cache import njit
 
 UNKNOWN, OCCUPIED, FREED = 0, 1, 2
 """Evidence about a point: unseen or in doubt, occupied earlier, free space earlier."""
-_MAX_SIDE_BEAMS = 64
-_PROBES = 3  # points of a standing cluster about which an earlier scan is asked
-_STANDS = 3  # recent scans that see a point occupied, and none free: it stands
-_ASK = 3  # evidence until the earlier scans are asked about a point
+ENOUGH = 3
+"""Beams of an obstacle, scans or detections that are no coincidence: of M of N detections, the M
+(S. Blackman, R. Popoli, 1999, section 6.2)."""
+_MAX_SIDE_BEAMS = 64  # to each side of a point: nearer than 0.15 m the margin would be all around
+_ASK = 3  # a code beside the three above: until the earlier scans are asked about a point
 
 
 class ScanView(NamedTuple):
@@ -213,7 +214,7 @@ def compare_scan(
         point = (points[k, 0], points[k, 1], points[k, 2])
         occupied, found = 0, UNKNOWN
         for i in range(slots.shape[0]):
-            if i == recent and occupied >= _STANDS:
+            if i == recent and occupied >= ENOUGH:
                 break
             found = _evidence(ranges, origins, turns, slots[i], beams, doubts, point)
             occupied += found == OCCUPIED
@@ -328,15 +329,15 @@ def find_arrived(
         middle = (first + count // 2) % n
         width = count * abs(scan.increment) * float(scan.ranges[middle])
         arrived[row] = False
-        if clusters[row, 3] == 0 or count < _PROBES or width > widest:
+        if clusters[row, 3] == 0 or count < ENOUGH or width > widest:
             continue
         for i in range(order.slots.shape[0]):
             freed = 0
-            for probe in range(_PROBES):
-                k = (first + (2 * probe + 1) * count // (2 * _PROBES)) % n
+            for probe in range(ENOUGH):
+                k = (first + (2 * probe + 1) * count // (2 * ENOUGH)) % n
                 point = (points[k, 0], points[k, 1], points[k, 2])
                 found = _evidence(ranges, origins, turns, order.slots[i], beams, doubts, point)
                 freed += found == FREED
-            if freed == _PROBES:
+            if freed == ENOUGH:
                 arrived[row] = True
                 break

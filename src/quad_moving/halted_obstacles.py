@@ -15,18 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_moving.discs import Outlines, Radius, fit, fit_points
+from quad_moving.earlier_scans import ENOUGH
 from quad_moving.kalman import Filters
-from quad_moving.moving_points import ScanClusters, TrackerParams
+from quad_moving.moving_points import SLOTS, SPACING_S, ScanClusters, TrackerParams
 
 Floats = NDArray[np.float64]
 
-SLOW_MPS = 0.3
-"""An obstacle that is slower when its track ends has stopped."""
-_SPEED_MPS = 0.1  # standard deviation of each component of its velocity then
-_BESIDE_M = 0.15  # points that are its own are no farther from its disc
-_MIN_POINTS = 3
-_SEEN_THROUGH_S = 0.3  # patience with one at whose place there is nothing
-_HIDDEN_S = 60.0  # patience with one that something hides
+SPEED_MPS = 0.1
+"""Standard deviation of each component of the velocity of an obstacle that has stopped."""
+BESIDE_M = 0.15
+"""Points of an obstacle are no farther from its disc: half of a person's step."""
+PATIENCE_S = 0.3
+"""A few scans without a sign of an obstacle where it should be seen: it is not there."""
+_HIDDEN_S = SPACING_S * SLOTS  # as long as the places of earlier scans are remembered
 
 
 class HaltedObstacles:
@@ -48,7 +49,7 @@ class HaltedObstacles:
 
     def add(self, place: Floats, noise: Floats, radius: Radius, now_s: float) -> None:
         """Follow one more, at a place, float64[2], with its covariance, float64[2, 2]."""
-        self._filters.add(place, noise, _SPEED_MPS)
+        self._filters.add(place, noise, SPEED_MPS)
         self._radii.append(radius)
         self._seen_s.append(now_s)
 
@@ -78,7 +79,7 @@ class HaltedObstacles:
         for row in np.flatnonzero(clusters.arrived & (seen.radii_m <= params.max_radius_m)):
             known = np.concatenate([others, self.rows[:, [0, 1, 4]]])
             away_m = np.hypot(*(known[:, :2] - seen.centres[row]).T)
-            if (away_m < known[:, 2] + _BESIDE_M).any():
+            if (away_m < known[:, 2] + BESIDE_M).any():
                 continue
             radius, is_whole = Radius(), bool(seen.is_whole[row])
             radius.see(float(seen.radii_m[row]), is_whole)
@@ -94,8 +95,8 @@ class HaltedObstacles:
     def _see(self, row: int, clusters: ScanClusters, is_small: NDArray[np.bool_]) -> None:
         place, radius = self._filters.states[row, :2], self._radii[row]
         away_m = np.hypot(*(clusters.points[:, :2] - place).T)
-        beams = is_small & (away_m < radius.outer_m + _BESIDE_M)
-        if beams.sum() >= _MIN_POINTS:
+        beams = is_small & (away_m < radius.outer_m + BESIDE_M)
+        if beams.sum() >= ENOUGH:
             disc = fit_points(clusters, beams, place.copy(), radius)
             self._filters.update(row, disc.position, disc.noise)
             self._seen_s[row] = self._filters.time_s
@@ -105,7 +106,7 @@ class HaltedObstacles:
     def _is_gone(self, row: int, clusters: ScanClusters) -> bool:
         place, circle_m = self._filters.states[row, :2], self._radii[row].circle_m
         unseen_s = self._filters.time_s - self._seen_s[row]
-        is_through = unseen_s > _SEEN_THROUGH_S and clusters.sees_through(place, circle_m, 0.0)
+        is_through = unseen_s > PATIENCE_S and clusters.sees_through(place, circle_m, 0.0)
         return is_through or unseen_s > _HIDDEN_S
 
     def _keep(self, kept: NDArray[np.bool_]) -> None:

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_moving.earlier_scans import (
+    ENOUGH,
     Doubts,
     EarlierScans,
     Order,
@@ -33,6 +34,7 @@ from quad_moving.earlier_scans import (
     find_arrived,
     find_clusters,
 )
+from quad_nav.costmap.scan_validator import CORRECTION_M, CORRECTION_RAD
 from quad_nav.geometry import Pose3D, Scan, angle_difference
 from quad_nav.parameter import number
 
@@ -41,17 +43,14 @@ Heights = Tuple[float, float]
 
 SPACING_S, SLOTS, RECENT = 0.4, 40, 5
 """Earlier scans: the time from one to the next, their number, and how many of them are recent."""
-RANGE_NOISE_M = 0.02
-"""Standard deviation of ranges, of common LIDARs."""
+NOISE_M = 0.02
+"""Standard deviation of ranges of common LIDARs, and of the pose of one that flies."""
 LEVEL_M, UPRIGHT_M = 0.3, 0.8
 """Heights above or below a LIDAR's plane, which tilts in flight: in the first its beams speak for
 upright things, in the second they still show where one is that is tracked."""
-_INCIDENCE_RAD = math.radians(10.0)
-_IDLE_STEP = 3  # where nothing moved, one of three beams is compared: a track needs three
+_INCIDENCE_RAD = math.radians(10.0)  # the least that Borges and Aldon take for a surface
 _IDLE_PERIOD_S = 0.1  # where nothing moved, scans that come earlier are left out
 _FULL_TURN_BEAMS = 1.5  # a gap of fewer beams is none
-# A larger step of the pose from one scan to the next is a correction of the localisation.
-_CORRECTION_M, _CORRECTION_RAD = 0.25, 0.3
 
 
 @dataclass(frozen=True)
@@ -171,7 +170,7 @@ class MovingPoints:
         earlier, order = self._slots(count), self._order
         doubts = _doubts(scan, heights_m, params)
         is_idle = not is_thorough and not compare_scan(
-            view, earlier, order, False, _IDLE_STEP, doubts, points, evidence
+            view, earlier, order, False, ENOUGH, doubts, points, evidence
         )
         if not is_idle:
             compare_scan(view, earlier, order, is_thorough, 1, doubts, points, evidence)
@@ -189,7 +188,7 @@ class MovingPoints:
     ) -> ScanClusters:
         count = len(points)
         labels, rows = np.empty(count, np.int32), np.empty((count, 4), np.int64)
-        found = find_clusters(view, points, evidence, _INCIDENCE_RAD, RANGE_NOISE_M, labels, rows)
+        found = find_clusters(view, points, evidence, _INCIDENCE_RAD, NOISE_M, labels, rows)
         rows, arrived = rows[:found], np.zeros(found, np.bool_)
         earlier, widest_m = self._slots(count), 2.0 * params.max_radius_m
         find_arrived(view, earlier, self._order, doubts, widest_m, points, rows, arrived)
@@ -211,8 +210,8 @@ class MovingPoints:
         if before is not None and (
             beams != self._beams
             or scan.stamp_s < self._newest_s
-            or math.hypot(now.x_m - before.x_m, now.y_m - before.y_m) > _CORRECTION_M
-            or abs(angle_difference(now.yaw_rad, before.yaw_rad)) > _CORRECTION_RAD
+            or math.hypot(now.x_m - before.x_m, now.y_m - before.y_m) > CORRECTION_M
+            or abs(angle_difference(now.yaw_rad, before.yaw_rad)) > CORRECTION_RAD
         ):
             self.reset()
         self._previous, self._beams = now, beams

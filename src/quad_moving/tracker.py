@@ -21,11 +21,12 @@ from typing import Dict, List, Optional, Set
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_moving.association import assign
+from quad_moving.association import GATE, assign
 from quad_moving.discs import Outlines, Radius, fit, outlines
-from quad_moving.halted_obstacles import SLOW_MPS, HaltedObstacles
+from quad_moving.earlier_scans import ENOUGH
+from quad_moving.halted_obstacles import BESIDE_M, PATIENCE_S, SPEED_MPS, HaltedObstacles
 from quad_moving.kalman import Filters
-from quad_moving.moving_points import Heights, MovingPoints, ScanClusters, TrackerParams
+from quad_moving.moving_points import SLOTS, Heights, MovingPoints, ScanClusters, TrackerParams
 from quad_nav.config.plugins import Parameters
 from quad_nav.costmap.scan_filter import FilteredScan, ScanFilter, ScanSituation
 from quad_nav.costmap.tracks import Tracks
@@ -35,18 +36,8 @@ Floats = NDArray[np.float64]
 
 FIRST_SPEED_MPS = 1.0
 """Standard deviation of each component of an obstacle's velocity when it is first seen."""
-_MIN_POINTS = 3
-_FREED_SHARE = 0.5
-_HITS, _SUSPECT_HITS = 3, 2
-_MOVED_M = 0.12
-_SIGNIFICANT = 13.8  # chi-square, 2 degrees of freedom, 0.1 %
-_SEEN_THROUGH_S = 0.3  # patience with a track at whose place there is nothing
-_RESTART_S = 1.5  # time in which a track is confirmed, or measured from another start
-_TENTATIVE_S = 0.3  # patience with a track that is not confirmed
-_IN_DOUBT_S = 0.6  # time for which a track may be in space that was never seen: slivers of walls
-_BESIDE_M = 0.15
-_INNER_PART = 0.6  # of a known disc's radius: a halted obstacle within it is the same obstacle
-_TRAIL_SCANS = 60
+_RESTART_S = 1.5  # time in which a walker is confirmed, or else measured from another start
+_IN_DOUBT_S = 2.0 * PATIENCE_S  # a track may be in space that was never seen: slivers of walls
 _NO_CIRCLES = np.empty((0, 3))
 _NO_POINTS = np.empty((0, 3))
 
@@ -194,7 +185,9 @@ class Tracker(ScanFilter):
         self._predict(now_s, known_circles)
         pairs = [
             (track, row)
-            for track, row in assign(self._states, self._filters.covariances, seen, usable)
+            for track, row in assign(
+                self._states, self._filters.covariances, seen, usable, self.params.max_radius_m
+            )
             if clusters.rows[row, 2] or now_s - self._lives[track].freed_s <= _IN_DOUBT_S
         ]
         for track, row in pairs:
@@ -239,7 +232,7 @@ class Tracker(ScanFilter):
             (*state, life.radius.outer_m)
             for state, life in zip(self._states, self._lives)
             if not life.is_confirmed
-            and life.hits >= _SUSPECT_HITS
+            and life.hits >= ENOUGH - 1
             and (np.hypot(*(halted[:, :2] - state[:2]).T) > halted[:, 4]).all()
         ]
         return np.concatenate([halted, np.array(new, float).reshape(-1, 5)])
@@ -253,7 +246,7 @@ class Tracker(ScanFilter):
         radii_m = np.array([life.radius.circle_m for life in self._lives], float)
         tracked = np.column_stack([self._states[told, :2], radii_m[told]])
         others = np.concatenate([tracked, known_circles])
-        self._halted.forget(others[:, :2], _INNER_PART * others[:, 2])
+        self._halted.forget(others[:, :2], 0.5 * others[:, 2])
         self._halted.notice(clusters, seen, self.params, others)
 
     def _usable(
@@ -266,7 +259,7 @@ class Tracker(ScanFilter):
         """
         usable = (
             (clusters.rows[:, 3] == 0)
-            & (clusters.rows[:, 1] >= _MIN_POINTS)
+            & (clusters.rows[:, 1] >= ENOUGH)
             & (seen.radii_m <= self.params.max_radius_m)
             & ((clusters.rows[:, 2] > 0) | seen.is_whole)
         )
@@ -305,7 +298,7 @@ class Tracker(ScanFilter):
         """Keep the points of a track until it is confirmed."""
         if not life.is_confirmed:
             life.trail.append(clusters.points[clusters.beams(row)])
-            del life.trail[:-_TRAIL_SCANS]
+            del life.trail[:-SLOTS]
 
     def _drop(
         self, now_s: float, updated: Set[int], clusters: ScanClusters, seen: Outlines
@@ -317,11 +310,11 @@ class Tracker(ScanFilter):
                 continue
             unseen_s = now_s - life.seen_s
             if not life.is_confirmed:
-                keep[track] = unseen_s <= _TENTATIVE_S
+                keep[track] = unseen_s <= PATIENCE_S
             elif self._stands(track, clusters, seen):
                 keep[track] = False
             elif self._is_seen_through(track, clusters):
-                keep[track] = unseen_s <= _SEEN_THROUGH_S
+                keep[track] = unseen_s <= PATIENCE_S
             else:
                 keep[track] = unseen_s <= self.params.lost_after_s
         self._keep(keep, now_s)
@@ -333,7 +326,7 @@ class Tracker(ScanFilter):
     def _halt(self, track: int, now_s: float) -> None:
         """Follow the obstacle of a track that ends, if it has stopped."""
         life, speed_mps = self._lives[track], math.hypot(*self._states[track, 2:])
-        if life.is_confirmed and speed_mps < SLOW_MPS:
+        if life.is_confirmed and speed_mps < self.params.min_speed_mps + SPEED_MPS:
             noise = self._filters.covariances[track, :2, :2]
             self._halted.add(self._states[track, :2], noise, life.radius, now_s)
 
@@ -343,7 +336,7 @@ class Tracker(ScanFilter):
         if math.hypot(vx_mps, vy_mps) > self.params.min_speed_mps:
             return False
         near = np.hypot(seen.centres[:, 0] - x_m, seen.centres[:, 1] - y_m)
-        limit_m = self._lives[track].radius.circle_m + _BESIDE_M
+        limit_m = self._lives[track].radius.circle_m + BESIDE_M
         return bool(((clusters.rows[:, 3] == 1) & (near < limit_m)).any())
 
     def _begin(
@@ -356,7 +349,7 @@ class Tracker(ScanFilter):
     ) -> None:
         """Begin tracks of clusters in space that was free and that belong to no track."""
         freed, beams = clusters.rows[:, 2], clusters.rows[:, 1]
-        wanted = usable & (freed >= _MIN_POINTS) & (freed >= _FREED_SHARE * beams)
+        wanted = usable & (freed >= ENOUGH) & (freed >= 0.5 * beams)
         for row in np.flatnonzero(wanted).tolist():
             if row in taken or self._is_covered(seen.centres[row]):
                 continue
@@ -376,7 +369,7 @@ class Tracker(ScanFilter):
     def _is_covered(self, centre: Floats) -> bool:
         """Return whether a place is in the disc of a track, float64[2]."""
         for state, life in zip(self._states, self._lives):
-            if math.hypot(*(centre - state[:2])) < life.radius.outer_m + _BESIDE_M:
+            if math.hypot(*(centre - state[:2])) < life.radius.outer_m + BESIDE_M:
                 return True
         return False
 
@@ -392,7 +385,7 @@ class Tracker(ScanFilter):
                 life.trail = []
             if life.is_confirmed:
                 away_m = np.hypot(*(seen.centres - state[:2]).T)
-                rows |= may_move & (away_m < life.radius.outer_m + _BESIDE_M)
+                rows |= may_move & (away_m < life.radius.outer_m + BESIDE_M)
         beams = np.append(rows, False)[clusters.labels]  # label -1 takes the last one
         return TrackedScan(beams, np.concatenate(vacated) if vacated else _NO_POINTS)
 
@@ -401,7 +394,9 @@ class Tracker(ScanFilter):
         passed_s = life.seen_s - life.start_s
         moved = state[:2] - life.start
         moved_m = math.hypot(*moved)
-        if life.hits < _HITS or moved_m < max(_MOVED_M, self.params.min_speed_mps * passed_s):
+        if life.hits < ENOUGH or moved_m < max(
+            self.params.margin_m, self.params.min_speed_mps * passed_s
+        ):
             if passed_s > _RESTART_S:
                 life.start, life.start_noise = state[:2].copy(), covariance[:2, :2].copy()
                 life.start_s = life.seen_s
@@ -409,7 +404,7 @@ class Tracker(ScanFilter):
         (xx, xy), (_, yy) = (life.start_noise + covariance[:2, :2]).tolist()
         dx, dy = moved.tolist()
         square = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
-        return bool(square > _SIGNIFICANT)
+        return bool(square > GATE)
 
     def _keep(self, keep: NDArray[np.bool_], now_s: float) -> None:
         """Keep some tracks; of the others, follow the obstacles that have stopped."""

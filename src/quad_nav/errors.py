@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from contextlib import contextmanager
-from typing import Any, Iterator, List, Sequence
+from typing import Any, Iterator, List, NoReturn, Sequence
 
 MAX_PROBLEMS = 100
 _MAX_LENGTH = 2000
@@ -80,6 +80,11 @@ class NoLocalPlan(ControlError):
 
 class InvalidGoal(NavigationError):
     """The pose of a goal is invalid: no rotation, not finite, or in an unknown frame."""
+
+
+def assert_never(value: NoReturn) -> NoReturn:
+    """Tell mypy that every kind of value is handled before; Python 3.11 has it in ``typing``."""
+    raise AssertionError(f"{value!r} is not handled")
 
 
 def printable(text: object, keep: str = "") -> str:

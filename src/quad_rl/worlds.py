@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from quad_nav.api.flight import PERIOD_S, Command, Flight, periods
 from quad_nav.geometry import Pose2D
 from quad_nav.loop.flight_loop import STEPS_PER_ODOMETRY
+from quad_nav.mission.actions import Action, GoalEnded
 from quad_nav.mission.goal_file import GoalSequence
-from quad_nav.mission.sequencer import Action, GoalEnded, Sequencer
+from quad_nav.mission.sequencer import Sequencer
 from quad_nav.offline.flight import FlightObserver
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.sim.contacts import Contact

@@ -52,7 +52,7 @@ def write_result(
 
 def _write_report(result: TuneResult, command: str, pictures: Optional[Path]) -> Path:
     """Write the report; the import is local because matplotlib loads slowly."""
-    from quad_nav.report.page import write_page
+    from quad_nav.report.page import write_page, write_pictures
     from quad_tune.report.tune_page import tune_page
 
     path = result.setup.options.output / REPORT
@@ -60,7 +60,10 @@ def _write_report(result: TuneResult, command: str, pictures: Optional[Path]) ->
         _traced(result, name, assignments)
         for name, assignments in (("base", ()), ("tuned", result.assignments))
     )
-    write_page(tune_page(result, before, after, command), path, pictures)
+    page = tune_page(result, before, after, command)
+    write_page(page, path)
+    if pictures is not None:
+        write_pictures(page, pictures)
     return path
 
 

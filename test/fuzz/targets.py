@@ -32,7 +32,7 @@ from quad_nav.report.flight_metrics import flight_metrics
 from quad_nav.report.flight_page import flight_page
 from quad_nav.scenario.goal_checks import scene_check
 from quad_nav.sim.scene_file import load_scene
-from quad_nav.topics.flight_info import EVENTS_TOPIC, FLIGHT_TOPIC
+from quad_nav.topics.flight_info import FLIGHT_TOPIC, FlightInfo, RobotInfo
 
 MAX_FUZZED_CELLS = 250_000
 """Larger maps are valid, too, but too slow for a hundred calls per second."""
@@ -92,17 +92,23 @@ def bag(data: bytes) -> None:
 
 
 def flight_info(data: bytes) -> None:
-    """``/quad/flight`` and, line by line, ``/quad/events`` of a recording with odometry."""
-    first, *events = data.decode("utf-8", "replace").split("\n")
+    """Line by line the texts of ``/quad/flight``, see ``_flight_message``."""
     reading = _reading_with_odometry()
-    text = messages.message
     try:
-        reading.add(Message(FLIGHT_TOPIC, "std_msgs/String", 0, text("std_msgs/String", first)))
-        for line in events:
-            reading.add(Message(EVENTS_TOPIC, "std_msgs/String", 0, text("std_msgs/String", line)))
+        reading.add(_flight_message(data))
     except ValueError:
         return  # read_trace makes an InputError of it
     flight_metrics(reading.trace(Path("flight.bag")))
+
+
+def _flight_message(data: bytes) -> Message:
+    """Return a message with a line each for scene, goals, parameters, title and robot's name."""
+    lines = data.decode("utf-8", "replace").split("\n")
+    scene, goals, parameters, title, name = (*lines, *[""] * 5)[:5]
+    content = messages.flight_info(FlightInfo(title, robots=(RobotInfo(name),)))
+    content.scene = scene
+    content.robots[0].goals, content.robots[0].parameters = goals, parameters
+    return Message(FLIGHT_TOPIC, "quad/FlightInfo", 0, content)
 
 
 def journal(data: bytes) -> None:
@@ -114,9 +120,8 @@ def journal(data: bytes) -> None:
 def page(data: bytes) -> None:
     """The whole report of a flight that is told by ``flight_info``; slow."""
     reading = _reading_with_odometry()
-    told = messages.message("std_msgs/String", data.decode("utf-8", "replace"))
     try:
-        reading.add(Message(FLIGHT_TOPIC, "std_msgs/String", 0, told))
+        reading.add(_flight_message(data))
     except ValueError:
         return
     flight_page(reading.trace(Path("flight.bag")))
@@ -133,7 +138,10 @@ def robot_messages(data: bytes) -> None:
         ("/move_base0/recovery_status", "move_base_msgs/RecoveryStatus"),
         ("/tf", "tf2_msgs/TFMessage"),
         ("/clock", "rosgraph_msgs/Clock"),
-        ("/simulation/contacts", "diagnostic_msgs/DiagnosticStatus"),
+        ("/simulation/contacts", "quad/Contact"),
+        (FLIGHT_TOPIC, "quad/FlightInfo"),
+        ("/quad/events", "quad/MissionEvent"),
+        ("/move_base0/right_of_way", "quad/RightOfWay"),
     ]
     topic, kind = topics[data[0] % len(topics) if data else 0]
     assert _is_wanted(topic, kind)

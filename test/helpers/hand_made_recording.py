@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Optional
 
@@ -10,11 +11,14 @@ import numpy as np
 
 from quad_nav.geometry import Pose2D, Pose3D, Scan, quaternion_from_yaw
 from quad_nav.grid import GridSpec
+from quad_nav.mission.actions import GoalEnded, SendGoal
+from quad_nav.mission.goal import Goal
 from quad_nav.recording import messages
 from quad_nav.recording.record_file import TopicWriter, create, stamp_at
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, Scene, Walls
-from quad_nav.topics import flight_info
+from quad_nav.topics.flight_info import FLIGHT_TOPIC, RobotInfo, simulation_info
 from quad_nav.topics.markers import CUBE, OBSTACLES_TOPIC, Marker
+from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event
 
 SCENE = Scene(
     "room",
@@ -26,7 +30,6 @@ SCENE = Scene(
     obstacles=(Box("b", 5.0, 7.0, 1.0, 1.0, 2.0),),
 )
 LAST_S = 20.0
-SENT = {"yaw_rad": 0.0, "attempt": 1, "why": ""}
 
 
 def x_at(time_s: float) -> float:
@@ -44,15 +47,12 @@ def write_flight(path: Path, scene: Scene = SCENE, cart_y_m: Optional[float] = N
     def write(topic, time_s, content, latched=False):
         topics.write(topic, stamp_at(time_s), content, "/node", latched)
 
-    info = {
-        **flight_info.simulation_info(scene, 3),
-        "robot_radius_m": BODY_RADIUS_M,
-        "robots": [
-            {"name": "quad0", "goals": [[4.0, 2.0], [7.0, 2.0, 0.0]], "parameters": {}},
-            {"name": "quad1", "goals": [[8.0, 2.0]], "parameters": {}},
-        ],
-    }
-    write(flight_info.FLIGHT_TOPIC, 0.0, messages.text(flight_info.to_text(info)), True)
+    robots = (
+        RobotInfo("quad0", (Goal(4.0, 2.0), Goal(7.0, 2.0, 0.0))),
+        RobotInfo("quad1", (Goal(8.0, 2.0),)),
+    )
+    info = replace(simulation_info(scene, 3), robot_radius_m=BODY_RADIUS_M, robots=robots)
+    write(FLIGHT_TOPIC, 0.0, messages.flight_info(info), True)
     spec = GridSpec(4, 3, 0.5, -1.0, -2.0)
     for step in range(int(LAST_S * 10) + 1):
         time_s = step / 10.0
@@ -84,13 +84,14 @@ def write_flight(path: Path, scene: Scene = SCENE, cart_y_m: Optional[float] = N
             x0, y0 = (step // 10) % 4, (step // 40) % 3
             update = messages.grid_update(np.full((1, 1), 254, np.uint8), x0, y0, "odom0", stamp)
             write("/move_base0/local_costmap/costmap_updates", time_s, update)
-    for event in (
-        {"event": "sent", "goal": 0, "time_s": 2.0, "x_m": 4.0, "y_m": 2.0, **SENT},
-        {"event": "ended", "time_s": 11.0, "reached": True, "attempts": 1, "reason": ""},
-        {"event": "sent", "goal": 1, "time_s": 11.0, "x_m": 7.0, "y_m": 2.0, **SENT},
+    for time_s, action in (
+        (1.0, SendGoal(0, 1, Pose2D(4.0, 2.0, 0.0), 1)),
+        (10.0, GoalEnded(0, 1, Goal(4.0, 2.0), True, 9.0, 1)),
+        (10.0, SendGoal(1, 1, Pose2D(7.0, 2.0, 0.0), 1)),
     ):
-        event = {"robot": 0, "lap": 1, "yaw_error_rad": None, **event}
-        write(flight_info.EVENTS_TOPIC, LAST_S, messages.text(flight_info.to_text(event)))
+        fields = mission_event(0, time_s, action).fields
+        event = messages.stamped("quad/MissionEvent", fields, stamp_at(time_s))
+        write(EVENTS_TOPIC, LAST_S, event)
     topics.close()
     assert topics.problem == ""
     return path

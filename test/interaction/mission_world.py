@@ -92,7 +92,7 @@ class MissionWorld(SequencedWorld):
             if self._is_reset:
                 self._is_reset = False
                 self._put_back()
-                self.on_event({"event": "reset"})
+                self.on_reset()
                 resets.publish(Time(rospy.Time.now()))
             if self.is_running:
                 self._step()

@@ -9,13 +9,14 @@ from pathlib import Path
 import rospy
 from interaction.pilots import Pilot
 from interaction.virtual_ros import Graph
-from std_msgs.msg import String
+from quad.msg import MissionEvent
+from ros.own_messages import event_of
 
 from quad_nav.mission import journal
 from quad_nav.ros.sequencer import node
 from quad_nav.ros.sequencer.mission import MissionRunner
 from quad_nav.scenario.mission_setup import read_setup
-from quad_nav.topics.flight_info import EVENTS_TOPIC
+from quad_nav.topics.mission_events import EVENTS_TOPIC
 
 journal.os.fsync = lambda _: None  # a node dies here, but never the machine
 SPACING_M = 5.0
@@ -32,6 +33,7 @@ class SequencedWorld:
         sequencer: Node of the sequencer, None while it is dead.
         runner: Its mission, None before it has begun.
         on_event: Called with what the sequencer says.
+        on_reset: Called when the simulation is reset.
     """
 
     parameters = {}
@@ -41,7 +43,7 @@ class SequencedWorld:
         self.robots, self.graph = robots, Graph(clock)
         self.pilots, self._pilot_nodes = {}, {}
         self.sequencer = self.runner = None
-        self.on_event = lambda event: None
+        self.on_event, self.on_reset = lambda event: None, lambda: None
         self._folder = tempfile.TemporaryDirectory(prefix="quad_mission_")
         self.folder = Path(self._folder.name)
         for robot in range(robots):
@@ -93,7 +95,7 @@ class SequencedWorld:
 
     def hear_events(self):
         """Subscribe to what the sequencer says, as the node whose code runs."""
-        rospy.Subscriber(EVENTS_TOPIC, String, lambda m: self.on_event(json.loads(m.data)))
+        rospy.Subscriber(EVENTS_TOPIC, MissionEvent, lambda one: self.on_event(event_of(one)))
 
     def call(self, name):
         """Call a service; return its response, None if nobody offers it."""

@@ -24,6 +24,8 @@ from interaction.mission_world import (  # noqa: E402
     MissionWorld,
 )
 
+from quad_nav.mission.actions import Event  # noqa: E402
+
 ROBOT = st.integers(0, ROBOTS - 2)
 UNTOUCHED = ROBOTS - 1
 """Nothing happens to this quadcopter alone."""
@@ -90,6 +92,7 @@ class MissionMachine(RuleBasedStateMachine):
         undisturbed()
         self.world = MissionWorld()
         self.world.on_event, self.world.on_step = self.take_event, self.take_step
+        self.world.on_reset = self.take_reset
         self.run(2.0)
 
     def teardown(self):
@@ -101,20 +104,18 @@ class MissionMachine(RuleBasedStateMachine):
 
     # What is known of the flight.
 
+    def take_reset(self):
+        """Forget the flight before a reset."""
+        self.goals, self.ended = [None] * ROBOTS, [set() for _ in range(ROBOTS)]
+
     def take_event(self, event):
-        """Follow what the sequencer says, and resets."""
-        if event["event"] == "reset":
-            self.goals, self.ended = [None] * ROBOTS, [set() for _ in range(ROBOTS)]
-            return
-        robot = event["robot"]
-        if event["event"] == "done":
+        """Follow what the sequencer says."""
+        robot, place = event.robot, (event.lap, event.goal)
+        if event.event is not Event.SENT:
             self.goals[robot] = None
-            return
-        place = event["lap"], event["goal"]
-        if event["event"] == "ended":
-            self.goals[robot] = None
-            self.ended[robot].add(place)
-        elif not event["why"]:
+            if event.event is not Event.DONE:
+                self.ended[robot].add(place)
+        elif not event.reason:
             self.goals[robot] = Goal(place)
             if place in self.ended[robot]:
                 self.faults.append(f"flown twice: {event}")
@@ -124,12 +125,12 @@ class MissionMachine(RuleBasedStateMachine):
     def check_again(self, robot, place, event):
         """Check a goal that is sent again."""
         goal = self.goals[robot]
-        if goal is None or goal.place != place or event["attempt"] < goal.attempt:
+        if goal is None or goal.place != place or event.attempts < goal.attempt:
             self.faults.append(f"sent again: {event}")
             return
-        goal.attempt = event["attempt"]
+        goal.attempt = event.attempts
         is_resumed = self.world.graph.threads.now_s - self.changed_s[robot] < GRACE_S
-        if "resumed" in event["why"] and not is_resumed:
+        if "resumed" in event.reason and not is_resumed:
             self.faults.append(f"resumed without being stopped: {event}")
 
     def change_clock(self):

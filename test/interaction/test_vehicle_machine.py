@@ -272,31 +272,40 @@ class VehicleMachine(RuleBasedStateMachine):
             known.stepped_s = self.now_s
         self.run(0.3)
 
-    @rule(number=NUMBER, name=st.sampled_from(["bridge", "navigator"]))
-    def a_node_of_one_is_killed_or_started_again(self, number, name):
+    @rule(number=NUMBER, is_soon=st.booleans())
+    def the_bridge_is_killed_or_started_again(self, number, is_soon):
         _, known = self.touch(number)
         known.changed_s = self.now_s
-        if name == "navigator":
-            is_alive = number in self.world.pilots
-            (self.world.kill_pilot if is_alive else self.world.start_pilot)(number)
-        elif number in self.world.machines:
+        was_dead = number not in self.world.machines
+        if not was_dead:
             self.world.kill_bridge(number)
-        else:
+            self.run(0.6)
+        if was_dead or is_soon:
             if self.world.is_flying(number):
                 known.taken_s, known.is_stopped = known.taken_s or self.now_s, True
             self.world.start_bridge(number, True)
+            self.run(0.6)
+
+    @rule(number=NUMBER)
+    def the_navigator_is_killed_or_started_again(self, number):
+        _, known = self.touch(number)
+        known.changed_s = self.now_s
+        is_alive = number in self.world.pilots
+        (self.world.kill_pilot if is_alive else self.world.start_pilot)(number)
         self.run(0.6)
 
-    @rule()
-    def the_sequencer_is_killed_or_started_again(self):
+    @rule(is_soon=st.booleans())
+    def the_sequencer_is_killed_or_started_again(self, is_soon):
         self.is_alone = False
         for known in self.known:
             known.changed_s = self.now_s
-        if self.world.sequencer is None:
-            self.world.start_sequencer(True)
-        else:
+        was_dead = self.world.sequencer is None
+        if not was_dead:
             self.world.kill_sequencer()
-        self.run(0.6)
+            self.run(0.6)
+        if was_dead or is_soon:
+            self.world.start_sequencer(True)
+            self.run(0.6)
 
     @rule(number=NUMBER, what=st.sampled_from(OF_ONE))
     def somebody_asks_one(self, number, what):

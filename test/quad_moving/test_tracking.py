@@ -218,7 +218,7 @@ def test_a_part_far_from_a_track_is_not_its_obstacle():
     def pairs(x_m, is_whole):
         five, usable = np.full(1, 5.0), np.ones(1, bool)
         seen = Outlines(np.array([[x_m, 0.0]]), 0.06 * five, np.array([is_whole]), five)
-        return assign(states, covariances, seen, usable)
+        return assign(states, covariances, seen, usable, 1.0)
 
     assert pairs(0.95, False) == pairs(5.0, True) == [(0, 0)]
     assert pairs(1.05, False) == pairs(8.0, True) == []

@@ -16,7 +16,7 @@ from quad_nav.costmap.voxel import VoxelLayerParams
 from quad_nav.errors import InputError
 from quad_nav.files import document, plain_yaml, values, xml_tree
 from quad_nav.mission import goal, goal_file
-from quad_nav.recording import bag_info, bag_trace
+from quad_nav.recording import bag_trace
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim import (
     imported_scene,
@@ -25,7 +25,7 @@ from quad_nav.sim import (
     scene_file,
     world_file,
 )
-from quad_nav.topics import validation
+from quad_nav.topics import flight_info, validation
 
 TABLE = (Path(__file__).parents[2] / "docs" / "limits.md").read_text(encoding="utf-8")
 ROWS = {
@@ -60,7 +60,7 @@ ROWS = {
     "recording that is read": [
         bag_trace.MAX_MEMORY_BYTES / 1e9,
         bag_trace.LONGEST_FLIGHT_S / 86400,
-        bag_info.MAX_ROBOTS,
+        flight_info.MAX_ROBOTS,
     ],
     "scan": [validation.MAX_BEAMS],
     "point cloud": [validation.MAX_POINTS],

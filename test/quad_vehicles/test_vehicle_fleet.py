@@ -9,13 +9,14 @@ import pytest
 
 rospy = pytest.importorskip("rospy")
 
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue  # noqa: E402
 from ros.fake_ros import FakePublisher, FakeRos, FakeService, deliver, subscribed  # noqa: E402
-from std_msgs.msg import Empty, String  # noqa: E402
+from ros.own_messages import event_message, state_message  # noqa: E402
+from std_msgs.msg import Empty  # noqa: E402
 from std_srvs.srv import TriggerRequest, TriggerResponse  # noqa: E402
 
 from quad_nav.geometry import Pose2D  # noqa: E402
-from quad_nav.topics.flight_info import EVENTS_TOPIC  # noqa: E402
+from quad_nav.mission.actions import Event  # noqa: E402
+from quad_nav.topics.mission_events import EVENTS_TOPIC  # noqa: E402
 from quad_vehicles.ros import fleet  # noqa: E402
 from quad_vehicles.ros.node import LAND_ALL_TOPIC  # noqa: E402
 from quad_vehicles.vehicle_file import Vehicle  # noqa: E402
@@ -69,11 +70,10 @@ class Fleet:
     def tell(self, **states):
         self.states.update(states)
         for name, state in states.items():
-            values = [KeyValue("state", state), KeyValue("reason", "as the test says")]
-            deliver(f"/{name}/state", DiagnosticStatus(values=values))
+            deliver(f"/{name}/state", state_message(state, "as the test says"))
 
     def say(self, robot, event):
-        deliver(EVENTS_TOPIC, String(f'{{"event": "{event}", "robot": {robot}}}'))
+        deliver(EVENTS_TOPIC, event_message(robot, event))
 
     def take_off(self):
         return FakeService.all["/vehicles/take_off"].handler(TriggerRequest())
@@ -218,18 +218,18 @@ def test_a_robot_that_is_stopped_in_the_wait_stays_on_the_ground(flown):
 
 def test_the_last_goal_lands_all(flown):
     flown.tell(vehicle0="flying", vehicle1="flying")
-    flown.say(0, "done")
+    flown.say(0, Event.DONE)
     assert flown.landings == 0
-    flown.say(1, "done")
+    flown.say(1, Event.DONE)
     assert flown.landings == 1
 
 
 def test_the_others_land_when_the_rest_is_taken_over(flown):
     flown.tell(vehicle0="flying", vehicle1="taken over")
-    flown.say(0, "sent")
+    flown.say(0, Event.SENT)
     flown.tell(vehicle0="flying", vehicle1="taken over")
     assert flown.landings == 0
-    flown.say(0, "done")
+    flown.say(0, Event.DONE)
     assert flown.landings == 1
     flown.tell(vehicle0="landing", vehicle1="taken over")
     assert flown.landings == 1
@@ -237,7 +237,7 @@ def test_the_others_land_when_the_rest_is_taken_over(flown):
 
 def test_the_others_land_when_the_last_one_is_taken_over(flown):
     flown.tell(vehicle0="flying", vehicle1="flying")
-    flown.say(0, "done")
+    flown.say(0, Event.DONE)
     flown.tell(vehicle1="taken over")
     assert flown.landings == 1
 
@@ -246,24 +246,24 @@ def test_the_others_land_when_the_last_one_is_taken_over(flown):
 def test_a_vehicle_on_the_ground_is_waited_for_unless_its_mission_is_stopped(flown, is_stopped):
     flown.ros._parameters["/mission/quad1/stopped"] = is_stopped
     flown.tell(vehicle0="flying", vehicle1="landed")
-    flown.say(0, "done")
+    flown.say(0, Event.DONE)
     assert flown.landings == is_stopped
     flown.ros._parameters["/mission/quad1/stopped"] = False
     flown.tell(vehicle0="landed", vehicle1="flying")
-    flown.say(1, "sent")
-    flown.say(1, "done")
+    flown.say(1, Event.SENT)
+    flown.say(1, Event.DONE)
 
 
 def test_a_vehicle_that_flies_again_lands_after_its_own_last_goal(ros, monkeypatch):
     flown = Fleet(ros, monkeypatch, simulated=1)
     flown.tell(vehicle0="flying", vehicle1="taken over")
-    flown.say(2, "done")
-    flown.say(0, "done")
+    flown.say(2, Event.DONE)
+    flown.say(0, Event.DONE)
     assert flown.landings == 1
     flown.tell(vehicle0="landed", vehicle1="flying")
-    flown.say(1, "sent")
+    flown.say(1, Event.SENT)
     ros._parameters["/mission/quad0/stopped"] = False
     flown.tell(vehicle0="landed")
     assert flown.landings == 1
-    flown.say(1, "done")
+    flown.say(1, Event.DONE)
     assert flown.landings == 2

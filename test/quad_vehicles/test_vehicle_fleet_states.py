@@ -9,8 +9,8 @@ import yaml
 
 rospy = pytest.importorskip("rospy")
 
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue  # noqa: E402
 from ros.fake_ros import FakeRos, FakeService, deliver  # noqa: E402
+from ros.own_messages import state_message  # noqa: E402
 from std_srvs.srv import TriggerRequest  # noqa: E402
 
 from quad_nav.errors import InputError  # noqa: E402
@@ -44,8 +44,7 @@ def wall(monkeypatch):
 
 
 def tell(number, state, reason=""):
-    values = [KeyValue("state", state), KeyValue("reason", reason)]
-    deliver(f"/vehicle{number}/state", DiagnosticStatus(values=values))
+    deliver(f"/vehicle{number}/state", state_message(state, reason))
 
 
 def call(service):

@@ -7,8 +7,8 @@ from unittest import mock
 
 import numpy as np
 import rospy
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from ros.fake_ros import FakePublisher, FakeRos, FakeService, deliver
+from ros.own_messages import state_message
 from std_srvs.srv import TriggerRequest, TriggerResponse
 
 from quad_nav.geometry import Pose3D, quaternion_from_yaw
@@ -66,8 +66,7 @@ class Mission:
             publisher = FakePublisher.all[f"/move_base_simple/goal{k}"]
             publisher.publish = lambda goal, k=k: self.sent.append((k, goal.pose.position.x))
         for k, state in enumerate(states if respawned or setup.resume else ()):
-            message = DiagnosticStatus(values=[KeyValue("state", state), KeyValue("reason", "")])
-            deliver(f"/vehicle{k}/state", message)
+            deliver(f"/vehicle{k}/state", state_message(state))
         self.runner.start()
         return self
 

@@ -9,17 +9,19 @@ from typing import Any, Callable, Dict
 import numpy as np
 import rospy
 from actionlib_msgs.msg import GoalID
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from flight_case import goal_pose
 from geometry_msgs.msg import PoseStamped, Quaternion, TransformStamped, Twist
 from move_base_msgs.msg import MoveBaseActionGoal
 from nav_msgs.msg import Odometry
+from quad.msg import Contact as ContactMessage
 from sensor_msgs.msg import LaserScan, MultiDOFJointState, PointCloud2
 from tf2_msgs.msg import TFMessage
 
 from quad_nav.peers.peer import Intention
+from quad_nav.ros.common.own_messages import contact_message
 from quad_nav.ros.common.packed_messages import STATES_TOPIC
 from quad_nav.ros.navigator.intention_topics import INTENTIONS_TOPIC, intentions_message
+from quad_nav.sim.contacts import Contact
 
 FLOOD = 30  # messages; ten for each simulated second
 FEW = (3, 1.0)  # number and period of goals: each replaces the sequencer's goal
@@ -81,11 +83,9 @@ def scan(increment=2.0 * math.pi / 512, stamp=None):
     return message
 
 
-def contact(robot="quad0", **values):
-    """Contact of robot 0 with a wall; ``values`` replace its values, None removes one."""
-    contents = {"time_s": "5", "with": "wall", "x_m": "1", "y_m": "5", **values}
-    pairs = [KeyValue(key, value) for key, value in contents.items() if value is not None]
-    return DiagnosticStatus(name="contact", hardware_id=robot, values=pairs)
+def contact(robot="quad0", x_m=1.0, time_s=5.0):
+    """Contact of robot 0 with a wall."""
+    return contact_message(Contact(time_s, robot, "wall", x_m, 5.0), time_s)
 
 
 def command():
@@ -160,8 +160,8 @@ KINDS: Dict[str, Kind] = {
     ),
     "NaN contact": Kind(
         "/simulation/contacts",
-        DiagnosticStatus,
-        lambda: contact(x_m="nan", y_m="nan", time_s="nan"),
+        ContactMessage,
+        lambda: contact(x_m=NAN),
         {SEQUENCER: "contacts: message dropped"},
     ),
     "NaN command": Kind("/cmd_vel0", Twist, command, {SIMULATOR: "command dropped"}),
@@ -182,10 +182,10 @@ KINDS: Dict[str, Kind] = {
     "scan without an increment": Kind(
         "/scan0", LaserScan, lambda: scan(0.0), {"/move_base0": "scan0.*increment 0 "}
     ),
-    "contact without a place": Kind(
+    "contact at the end of time": Kind(
         "/simulation/contacts",
-        DiagnosticStatus,
-        lambda: contact(x_m=None, time_s="soon"),
+        ContactMessage,
+        lambda: contact(time_s=END_OF_TIME.to_sec()),
         {SEQUENCER: "contacts: message dropped"},
     ),
     "NaN transform": Kind(
@@ -221,7 +221,7 @@ KINDS: Dict[str, Kind] = {
     ),
     "contact of an unknown robot": Kind(
         "/simulation/contacts",
-        DiagnosticStatus,
+        ContactMessage,
         lambda: contact("quad77"),
         {SEQUENCER: "contacts: message dropped"},
     ),

@@ -11,22 +11,22 @@ from typing import Any, Dict
 import genpy
 import rospy
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from fake_ros import FakeRos, FakeService, deliver
 from geometry_msgs.msg import Twist, Vector3
 from hostile_navigators import ROOT, STARTS, Navigators, hear_own_topics
 from move_base_msgs.msg import MoveBaseActionResult, RecoveryStatus
+from quad.msg import Contact as ContactMessage
 from std_msgs.msg import ColorRGBA, Time
 from visualization_msgs.msg import Marker, MarkerArray
 
 from quad_nav.mission.summary import write_json
+from quad_nav.ros.common.own_messages import contact_message
 from quad_nav.ros.common.packed_messages import STATES_TOPIC
 from quad_nav.ros.composed.own_nodes import OwnNodes
 from quad_nav.ros.sequencer.mission import MissionRunner
 from quad_nav.ros.simulator.node import SimulatorNode
 from quad_nav.scenario import mission_setup, simulator_setup
 from quad_nav.sim.contacts import Contact
-from quad_nav.topics.flight_info import CONTACT_STATUS, contact_values
 
 SCENE = str(ROOT / "scenes" / "arena.yaml")
 
@@ -181,14 +181,8 @@ class SequencerNode:
     def _stamp(self) -> rospy.Time:
         return rospy.Time.from_sec(self.now_s)
 
-    def _contact(self) -> DiagnosticStatus:
-        contact = Contact(self.now_s, "quad0", "wall", 1.0, 2.0)
-        values = contact_values(contact, self.now_s)
-        return DiagnosticStatus(
-            name=CONTACT_STATUS,
-            hardware_id="quad0",
-            values=[KeyValue(key, value) for key, value in values.items()],
-        )
+    def _contact(self) -> ContactMessage:
+        return contact_message(Contact(self.now_s, "quad0", "wall", 1.0, 2.0), self.now_s)
 
     def _result(self) -> MoveBaseActionResult:
         result = MoveBaseActionResult(status=GoalStatus(status=GoalStatus.PREEMPTED))

@@ -13,17 +13,18 @@ from unittest import mock
 import genpy
 import rospy
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from fake_ros import FakePublisher, FakeRos, FakeService, deliver
 from geometry_msgs.msg import Twist, Vector3
-from move_base_msgs.msg import MoveBaseActionGoal
+from own_messages import event_message, state_message
+from quad.msg import TakeOffActionGoal, VehicleState
 from sensor_msgs.msg import LaserScan
-from std_msgs.msg import Empty, String
+from std_msgs.msg import Empty
 
 sys.path.insert(1, str(Path(__file__).resolve().parents[1]))
 from vehicles.virtual_flight import Flight  # noqa: E402
 
 from quad_nav.geometry import Pose2D
+from quad_nav.mission.actions import Event
 from quad_nav.topics.vehicle_states import State
 from quad_vehicles.orders import Output
 from quad_vehicles.ros import fleet, maneuvers, node, topics
@@ -144,8 +145,8 @@ class VehicleUnderTest:
     def _status(self) -> GoalStatusArray:
         return GoalStatusArray(status_list=[GoalStatus(status=GoalStatus.ACTIVE)])
 
-    def _goal(self) -> MoveBaseActionGoal:
-        return MoveBaseActionGoal(goal_id=self._cancel())
+    def _goal(self) -> TakeOffActionGoal:
+        return TakeOffActionGoal(goal_id=self._cancel())
 
     def _cancel(self) -> GoalID:
         return GoalID(rospy.Time.now(), f"test {self.now_s}")
@@ -169,7 +170,7 @@ class FleetUnderTest:
         self.valid = {
             "/vehicle0/state": self._state,
             "/vehicle1/state": self._state,
-            fleet.EVENTS_TOPIC: lambda: String('{"event": "goal", "robot": 0}'),
+            fleet.EVENTS_TOPIC: lambda: event_message(0, Event.SENT),
         }
 
     def settle(self) -> None:
@@ -181,15 +182,15 @@ class FleetUnderTest:
     def recover(self) -> None:
         """A landing in good messages is heard, and the end of both missions lands all."""
         deliver("/vehicle0/state", self._state())
-        deliver("/vehicle1/state", DiagnosticStatus(values=[KeyValue("state", "landed")]))
+        deliver("/vehicle1/state", state_message("landed"))
         assert self._node._is_in_the_air(0) and not self._node._is_in_the_air(1)
         for robot in (0, 1):
-            deliver(fleet.EVENTS_TOPIC, String(f'{{"event": "goal", "robot": {robot}}}'))
+            deliver(fleet.EVENTS_TOPIC, event_message(robot, Event.SENT))
         before = self._timer.call_count
         for robot in (0, 7, 0):  # 7 is no robot of this fleet
-            deliver(fleet.EVENTS_TOPIC, String(f'{{"event": "done", "robot": {robot}}}'))
+            deliver(fleet.EVENTS_TOPIC, event_message(robot, Event.DONE))
         assert self._timer.call_count == before
-        deliver(fleet.EVENTS_TOPIC, String('{"event": "done", "robot": 1}'))
+        deliver(fleet.EVENTS_TOPIC, event_message(1, Event.DONE))
         assert self._timer.call_count == before + 1
         assert FakePublisher.all[node.LAND_ALL_TOPIC]
 
@@ -201,5 +202,5 @@ class FleetUnderTest:
         """Their requests are empty, and they wait for vehicles."""
         return {}
 
-    def _state(self) -> DiagnosticStatus:
-        return DiagnosticStatus(values=[KeyValue("state", "flying"), KeyValue("reason", "")])
+    def _state(self) -> VehicleState:
+        return state_message("flying")

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import rospy
 import rostest
-from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import Odometry
+from own_messages import state_of
+from quad.msg import VehicleState
 from std_msgs.msg import Empty
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,7 +33,7 @@ class Crazyflies(unittest.TestCase):
             rospy.Subscriber(name, kind, callback, i)
             for i in range(2)
             for name, kind, callback in (
-                (f"/vehicle{i}/state", DiagnosticStatus, self.on_state),
+                (f"/vehicle{i}/state", VehicleState, self.on_state),
                 (f"/odom{i}", Odometry, self.on_odometry),
             )
         ]
@@ -42,13 +43,13 @@ class Crazyflies(unittest.TestCase):
         self.process.communicate(timeout=10.0)
 
     def on_state(self, message, number):
-        self.values[number] = {one.key: one.value for one in message.values}
+        self.values[number] = message
 
     def on_odometry(self, message, number):
         self.odometry[number] = message
 
     def states(self):
-        return [values["state"] for values in self.values.values()]
+        return [state_of(one) for one in self.values.values()]
 
     def speed(self, number):
         twist = self.odometry[number].twist.twist.linear
@@ -73,8 +74,8 @@ class Crazyflies(unittest.TestCase):
         publisher.publish(Empty())
         self.wait(lambda: set(self.states()) == {"landing"}, "landing of both")
         self.wait(lambda: set(self.states()) == {"landed"}, "both on the ground")
-        self.assertEqual({one["armed"] for one in self.values.values()}, {"false"})
-        self.assertLess(max(float(one["height_m"]) for one in self.values.values()), 0.06)
+        self.assertEqual({one.armed for one in self.values.values()}, {False})
+        self.assertLess(max(one.height for one in self.values.values()), 0.06)
 
 
 if __name__ == "__main__":

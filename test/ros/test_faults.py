@@ -7,10 +7,10 @@ import time
 
 import rospy
 import rostest
-from diagnostic_msgs.msg import DiagnosticStatus
 from flight_case import FlightCase, Latest, goal_pose
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
+from quad.msg import Contact
 from sensor_faults import SensorFaults
 
 BLINDING = [
@@ -39,7 +39,7 @@ class Faults(FlightCase):
         super().setUpClass()
         cls.sensor_faults = SensorFaults()
         cls.odometry = [Latest(f"/true/odom{i}", Odometry) for i in (0, 1)]
-        cls.contacts = Latest("/simulation/contacts", DiagnosticStatus)
+        cls.contacts = Latest("/simulation/contacts", Contact)
         cls.moving_s = 0.0
         cls.subscriber = rospy.Subscriber("/cmd_vel0", Twist, cls.store_command)
         cls.start()

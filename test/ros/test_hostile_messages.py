@@ -2,7 +2,6 @@
 """Hostile messages in flight: no node dies, each is logged, and the mission goes on to its end."""
 
 import collections
-import json
 import math
 import os
 import re
@@ -14,8 +13,11 @@ import rostest
 from flight_case import PATIENCE_S, FlightCase, Latest, pid_of
 from hostile import KINDS, NAVIGATORS, SEQUENCER, SIMULATOR
 from nav_msgs.msg import Odometry
+from own_messages import event_of
+from quad.msg import MissionEvent
 from rosgraph_msgs.msg import Log
-from std_msgs.msg import String
+
+from quad_nav.mission.actions import Event
 
 NODES = (SIMULATOR, SEQUENCER, *NAVIGATORS)
 LONGEST_HOVER_S = {0: 5.0, 1: 2.5}  # simulated time; robot 1 receives no hostile message
@@ -74,13 +76,13 @@ class HostileMessages(FlightCase):
         cls.odometry = [FromSimulator(f"/odom{i}", Odometry) for i in (0, 1)]
         cls.events, cls.lines = [], []
         cls.subscribers = [
-            rospy.Subscriber("/quad/events", String, cls.store_event),
+            rospy.Subscriber("/quad/events", MissionEvent, cls.store_event),
             rospy.Subscriber("/rosout", Log, cls.store_line, queue_size=1000),
         ]
 
     @classmethod
     def store_event(cls, message):
-        cls.events.append(json.loads(message.data))
+        cls.events.append(event_of(message))
 
     @classmethod
     def store_line(cls, line):
@@ -135,12 +137,12 @@ class HostileMessages(FlightCase):
 
     def resent(self):
         """Goals that robot 1 got again, and those of a mission that was started again."""
-        sent = [event for event in self.events if event["event"] == "sent"]
-        first = [(event["robot"], event["goal"]) for event in sent if not event["why"]]
+        sent = [event for event in self.events if event.event is Event.SENT]
+        first = [(event.robot, event.goal) for event in sent if not event.reason]
         found = [
             f"robot {i} goal {g} was sent anew" for i, g in set(first) if first.count((i, g)) > 1
         ]
-        again = {event["why"] for event in sent if event["robot"] == 1 and event["why"]}
+        again = {event.reason for event in sent if event.robot == 1 and event.reason}
         return found + [f"robot 1 got its goal again: {why}" for why in again]
 
     def wait_for_throttle(self, kind):

@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 import rospy
 import rostest
-from diagnostic_msgs.msg import DiagnosticStatus
 from flight_case import trigger
 from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry
+from own_messages import state_of
+from quad.msg import Contact, VehicleState
 from sensor_msgs.msg import LaserScan
 
 VEHICLES = Path(__file__).resolve().parents[1] / "vehicles" / "udp_vehicles.py"
@@ -29,8 +30,8 @@ class MixedVehicles(unittest.TestCase):
         cls.process = subprocess.Popen([sys.executable, str(VEHICLES), "ardupilot:14661:3:-2:30"])
         cls.scans, cls.odometry, cls.contacts, cls.state = {}, {}, [], ""
         cls.subscribers = [
-            rospy.Subscriber("/vehicle0/state", DiagnosticStatus, cls._on_state),
-            rospy.Subscriber("/simulation/contacts", DiagnosticStatus, cls._on_contact),
+            rospy.Subscriber("/vehicle0/state", VehicleState, cls._on_state),
+            rospy.Subscriber("/simulation/contacts", Contact, cls._on_contact),
         ]
         for i in range(2):
             cls.subscribers += [
@@ -46,11 +47,11 @@ class MixedVehicles(unittest.TestCase):
 
     @classmethod
     def _on_state(cls, message):
-        cls.state = message.message
+        cls.state = state_of(message)
 
     @classmethod
     def _on_contact(cls, message):
-        cls.contacts.append({one.key: one.value for one in message.values})
+        cls.contacts.append(message)
 
     @classmethod
     def _on_scan(cls, message, number):
@@ -75,7 +76,7 @@ class MixedVehicles(unittest.TestCase):
         return float(np.array(scan.ranges)[round(offset / scan.angle_increment) % beams])
 
     def test_a_flight(self):
-        self.wait(lambda: self.state.startswith("ready"), "readiness")
+        self.wait(lambda: self.state == "ready", "readiness")
         self.wait(lambda: set(self.scans) == set(self.odometry) == {0, 1}, "scans and odometry")
         # Before the take-off the simulated one looks over the real one, to the wall behind.
         self.assertAlmostEqual(self.range_m(1, 0.0), 5.5, delta=0.1)
@@ -99,7 +100,7 @@ class MixedVehicles(unittest.TestCase):
             time.sleep(0.05)
         self.publisher.publish(Twist())
         contact = self.contacts[0]
-        self.assertEqual((contact["robot"], contact["with"]), ("quad0", "quad1"))
+        self.assertEqual((contact.robot, contact.other), ("quad0", "quad1"))
         y_m = self.odometry[1].pose.pose.position.y
         self.assertAlmostEqual(y_m, 1.5 + 2 * RADIUS_M, delta=0.1)
 

@@ -4,14 +4,15 @@
 Two goals of the second quadcopter have a yaw, and it stays at the first.
 """
 
-import json
 from pathlib import Path
 
 import rospy
 import rostest
 from flight_case import FlightCase
-from std_msgs.msg import String
+from own_messages import event_of
+from quad.msg import MissionEvent
 
+from quad_nav.mission.actions import Event
 from quad_nav.mission.summary import to_json
 from quad_nav.offline.run import fly
 from quad_nav.scenario.flight_facts import offline_facts
@@ -24,15 +25,15 @@ class Offline(FlightCase):
         super().setUpClass()
         cls.events = []
         cls.subscriber = rospy.Subscriber(
-            "/quad/events", String, lambda message: cls.events.append(json.loads(message.data))
+            "/quad/events", MissionEvent, lambda message: cls.events.append(event_of(message))
         )
 
     def check_the_stay(self):
         """The second goal of the second quadcopter is sent 5 s after the first was reached."""
-        of_robot = [event for event in self.events if event["robot"] == 1]
-        ended = next(one for one in of_robot if (one["event"], one["goal"]) == ("ended", 0))
-        sent = next(one for one in of_robot if (one["event"], one["goal"]) == ("sent", 1))
-        self.assertAlmostEqual(sent["time_s"] - ended["time_s"], 5.0, delta=0.5)
+        of_robot = [event for event in self.events if event.robot == 1]
+        ended = next(one for one in of_robot if (one.event, one.goal) == (Event.REACHED, 0))
+        sent = next(one for one in of_robot if (one.event, one.goal) == (Event.SENT, 1))
+        self.assertAlmostEqual(sent.time_s - ended.time_s, 5.0, delta=0.5)
 
     def test_goal_times_are_those_of_the_flight_on_ros(self):
         goals = Path(rospy.get_param("~goals"))

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Nodes killed and stopped in flight: hover, resume, no goal lost or flown twice."""
 
-import json
 import os
 import signal
 import time
@@ -9,7 +8,10 @@ import time
 import rospy
 import rostest
 from flight_case import FlightCase, pid_of
-from std_msgs.msg import String
+from own_messages import event_of
+from quad.msg import MissionEvent
+
+from quad_nav.mission.actions import Event
 
 STOPPED_S = 5.0  # wall time
 
@@ -20,7 +22,7 @@ class Respawn(FlightCase):
         super().setUpClass()
         cls.events = []
         cls.subscriber = rospy.Subscriber(
-            "/quad/events", String, lambda message: cls.events.append(json.loads(message.data))
+            "/quad/events", MissionEvent, lambda message: cls.events.append(event_of(message))
         )
 
     def test_the_mission_survives(self):
@@ -39,8 +41,8 @@ class Respawn(FlightCase):
             self.assertTrue(
                 all(goal["reached"] and goal["attempts"] == 1 for goal in robot["goals"]), robot
             )
-        self.assertEqual(sorted(self.events_of("ended")), [(0, 0), (0, 1), (1, 0)])
-        first_sent = self.events_of("sent", why="")
+        self.assertEqual(sorted(self.events_of(Event.REACHED)), [(0, 0), (0, 1), (1, 0)])
+        first_sent = self.events_of(Event.SENT, reason="")
         self.assertEqual(len(first_sent), len(set(first_sent)), first_sent)
 
     def wait_for_flight(self, when):
@@ -64,9 +66,9 @@ class Respawn(FlightCase):
 
     def events_of(self, kind, **having):
         return [
-            (event["robot"], event["goal"])
+            (event.robot, event.goal)
             for event in self.events
-            if event["event"] == kind and all(event[key] == value for key, value in having.items())
+            if event.event is kind and all(getattr(event, k) == v for k, v in having.items())
         ]
 
 

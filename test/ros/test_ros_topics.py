@@ -34,7 +34,10 @@ TYPES = {
     "/move_base{i}/local_costmap/costmap_updates": "map_msgs/OccupancyGridUpdate",
     "/move_base{i}/local_costmap/footprint": "geometry_msgs/PolygonStamped",
     "/move_base{i}/state": "std_msgs/String",
-    "/move_base{i}/right_of_way": "diagnostic_msgs/DiagnosticStatus",
+    "/move_base{i}/right_of_way": "quad/RightOfWay",
+    "/quad/events": "quad/MissionEvent",
+    "/quad/flight": "quad/FlightInfo",
+    "/simulation/contacts": "quad/Contact",
     "/move_base{i}/parameter_descriptions": "dynamic_reconfigure/ConfigDescription",
     "/move_base{i}/parameter_updates": "dynamic_reconfigure/Config",
 }

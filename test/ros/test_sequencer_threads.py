@@ -13,18 +13,23 @@ from pathlib import Path
 import rospy
 import rostest
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PoseStamped, TransformStamped
 from move_base_msgs.msg import MoveBaseActionResult
 from nav_msgs.msg import Odometry
-from std_msgs.msg import String, Time
+from own_messages import event_of
+from quad.msg import Contact as ContactMessage
+from quad.msg import MissionEvent
+from std_msgs.msg import Time
 from std_srvs.srv import Trigger, TriggerResponse
 from tf2_ros import StaticTransformBroadcaster
 
 from quad_nav.mission import journal
+from quad_nav.mission.actions import Event
 from quad_nav.ros.common import readiness
+from quad_nav.ros.common.own_messages import contact_message
 from quad_nav.ros.sequencer.mission import MissionRunner
 from quad_nav.scenario.mission_setup import read_setup
+from quad_nav.sim.contacts import Contact
 
 ROBOTS, LEGS = 3, 40
 PERIOD_S, SPEED_MPS, SPACING_M = 0.025, 3.0, 5.0
@@ -93,10 +98,10 @@ class SequencerThreads(unittest.TestCase):
             one.transform.rotation.w = 1.0
         tf.sendTransform(transforms)
         cls.tf = tf
-        cls.contacts = rospy.Publisher("/simulation/contacts", DiagnosticStatus, queue_size=10)
+        cls.contacts = rospy.Publisher("/simulation/contacts", ContactMessage, queue_size=10)
         cls.resets = rospy.Publisher("/simulation/last_reset", Time, queue_size=1, latch=True)
         cls.events = []
-        rospy.Subscriber("/quad/events", String, lambda m: cls.events.append(json.loads(m.data)))
+        rospy.Subscriber("/quad/events", MissionEvent, lambda one: cls.events.append(event_of(one)))
         cls.stubs = [Stub(number) for number in range(ROBOTS)]
         threading.Thread(target=cls.fly, daemon=True).start()
         cls.runner = cls.mission(Path(tempfile.mkdtemp(prefix="quad_threads_")))
@@ -126,7 +131,7 @@ class SequencerThreads(unittest.TestCase):
             self.runner.publish_progress()
 
     def ended(self, number):
-        return [e["goal"] for e in self.events if e["event"] == "ended" and e["robot"] == number]
+        return [e.goal for e in self.events if e.event is Event.REACHED and e.robot == number]
 
     def test_the_others_fly_on(self):
         self.assertEqual(readiness.wait_for(self.runner.needs(), PATIENCE_S), [])
@@ -142,7 +147,7 @@ class SequencerThreads(unittest.TestCase):
     def reset(self):
         """A reset that the simulator reports restarts all missions, once."""
         self.resets.publish(Time(rospy.Time.now()))
-        first = lambda: sum(e["event"] == "sent" and e["goal"] == 0 for e in self.events)  # noqa: E731
+        first = lambda: sum(e.event is Event.SENT and e.goal == 0 for e in self.events)  # noqa: E731
         self.advance_until(lambda: first() == 2 * ROBOTS, "the first goals again")
         self.events.clear()
 
@@ -153,15 +158,9 @@ class SequencerThreads(unittest.TestCase):
             for stub in self.stubs:
                 stub.odometry.publish(stub.message(x, y, frame))
             self.runner.advance()
-        for x in ("nan", "1e300", "wall", "2.5"):
-            values = {"time_s": repr(rospy.get_time()), "with": "wall", "x_m": x, "y_m": "1"}
-            self.contacts.publish(
-                DiagnosticStatus(
-                    name="contact",
-                    hardware_id="quad1",
-                    values=[KeyValue(*pair) for pair in values.items()],
-                )
-            )
+        for x_m in (math.nan, 1e300, math.inf, 2.5):
+            contact = Contact(0.0, "quad1", "wall", x_m, 1.0)
+            self.contacts.publish(contact_message(contact, rospy.get_time()))
 
     def slow_disk(self):
         """Goals are sent while one access to the disk takes `DISK_S`."""

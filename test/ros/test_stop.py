@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Stop a mission and resume it; the simulator's rate in flight."""
 
-import json
 import os
 import signal
 
@@ -11,14 +10,17 @@ from diagnostic_msgs.msg import DiagnosticArray
 from dynamic_reconfigure.client import Client
 from flight_case import FlightCase, Record, pid_of, trigger
 from move_base_msgs.msg import MoveBaseActionResult
-from std_msgs.msg import String
+from own_messages import event_of
+from quad.msg import MissionEvent
+
+from quad_nav.mission.actions import Event
 
 
 class Stop(FlightCase):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.events = Record("/quad/events", String)
+        cls.events = Record("/quad/events", MissionEvent)
         cls.results = Record("/move_base0/result", MoveBaseActionResult)
         cls.statuses = {}
         rospy.Subscriber("/diagnostics", DiagnosticArray, cls._store)
@@ -30,8 +32,8 @@ class Stop(FlightCase):
             cls.statuses[status.name] = {pair.key: pair.value for pair in status.values}
 
     def sent(self):
-        events = [json.loads(message.data) for message in self.events.messages]
-        return [one for one in events if one["event"] == "sent"]
+        events = map(event_of, self.events.messages)
+        return [one for one in events if one.event is Event.SENT]
 
     def value(self, status, key):
         return self.statuses.get(status, {}).get(key)

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import rospy
 import rostest
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from flight_case import FlightCase, pid_of
+from quad.msg import RightOfWay as RightOfWayMessage
 from visualization_msgs.msg import MarkerArray
 from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.sync.client import connect
@@ -22,7 +22,7 @@ from websockets.sync.client import connect
 from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D
 from quad_nav.ros.common.conversions import marker_array
-from quad_nav.topics.right_of_way import RIGHT_OF_WAY_STATUS, RightOfWay
+from quad_nav.topics.right_of_way import Kind, RightOfWay
 from quad_nav.topics.tracked_obstacles import track_markers
 from quad_web.ros.actions import FlightActions
 from quad_web.ros.source import FlightSource
@@ -134,24 +134,18 @@ class Web(FlightCase):
         self.assertEqual(len(page.items["scene"]["walls"]), 4)
 
     def test_2_a_robot_that_makes_room_is_shown_with_its_holding_point(self):
-        topic = rospy.Publisher("/move_base0/right_of_way", DiagnosticStatus, queue_size=1)
+        topic = rospy.Publisher("/move_base0/right_of_way", RightOfWayMessage, queue_size=1)
         self.addCleanup(topic.unregister)
         self.wait(lambda: topic.get_num_connections() > 0, "a subscriber")
-        values = RightOfWay("makes room", "quad1", (2.5, 3.5)).values
-        pairs = [KeyValue(key, value) for key, value in values.items()]
+        makes_room = RightOfWay(Kind.MAKES_ROOM, "quad1", (2.5, 3.5))
         row = {"robot": 0, "peer": 1, "kind": "makes room", "hold": [2.5, 3.5]}
 
         def is_shown():  # the navigator publishes on the topic, too
-            topic.publish(DiagnosticStatus(name=RIGHT_OF_WAY_STATUS, values=pairs))
+            topic.publish(RightOfWayMessage(**makes_room.fields))
             return (self.page.items.get("yields") or {}).get("yields") == [row]
 
         self.wait(is_shown, lambda: f"{self.page.items.get('yields')}")
-        topic.publish(
-            DiagnosticStatus(
-                name=RIGHT_OF_WAY_STATUS,
-                values=[KeyValue(*pair) for pair in RightOfWay().values.items()],
-            )
-        )
+        topic.publish(RightOfWayMessage(**RightOfWay().fields))
 
     def test_3_pause_start_and_rate(self):
         self.assertIn("paused", self.do("pause"))

@@ -15,7 +15,7 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
-from quad_nav.mission.sequencer import Action, GoalEnded
+from quad_nav.mission.actions import Action, GoalEnded
 from quad_nav.offline.flight import Flight, FlightObserver
 
 _PERIOD_S = 0.1  # wall time between two updates

@@ -26,8 +26,8 @@ from quad_nav.geometry import Pose3D, Scan, angle_difference
 from quad_nav.parameter import flag
 
 _ELSEWHERE_M, _ELSEWHERE_RAD = 0.05, 0.05
-# A larger step of the pose from one scan to the next is a correction of the localisation.
-_CORRECTION_M, _CORRECTION_RAD = 0.25, 0.3
+CORRECTION_M, CORRECTION_RAD = 0.25, 0.3
+"""A larger step of the pose from one scan to the next is a correction of the localisation."""
 _LOST_SHARE = 0.25
 _HARDLY_MOVED_M = 2.0
 _ALL_AROUND_RAD = 2.0 * math.pi * 0.98
@@ -110,7 +110,7 @@ class SensorValidator:
         if (
             self._first_equal is None
             or self._first_equal[0] != content
-            or (previous is not None and _differ(here, previous, _CORRECTION_M, _CORRECTION_RAD))
+            or (previous is not None and _differ(here, previous, CORRECTION_M, CORRECTION_RAD))
         ):
             self._first_equal = content, here
             return ""

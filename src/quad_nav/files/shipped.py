@@ -41,10 +41,11 @@ def shipped(folder: str, name: str = "") -> Path:
 
 def is_shipped(name: str) -> bool:
     """Return whether a configuration of this name comes with the package."""
-    return name in _config_names()
+    return name in config_names()
 
 
-def _config_names() -> List[str]:
+def config_names() -> List[str]:
+    """List the names of the shipped configurations."""
     return sorted(
         path.stem for path in shipped("config").iterdir() if path.is_dir() or path.suffix == ".yaml"
     )
@@ -61,7 +62,7 @@ def config_folder(name: str) -> Path:
     path = Path(name).expanduser()
     if path.is_dir():
         return path
-    names = _config_names()
+    names = config_names()
     if name in names:
         folder = shipped("config") / name
         return folder if folder.is_dir() else folder.with_suffix(".yaml")

@@ -13,11 +13,13 @@ from typing import Dict, List, Optional, Sequence, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.errors import assert_never
 from quad_nav.geometry import Pose2D, angle_difference
+from quad_nav.mission.actions import Action, GoalEnded, SendGoal, SequenceDone
 from quad_nav.mission.distances import DistanceLog, SurfaceDistance
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.goal_file import GoalSequence
-from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal, SequenceDone, Sequencer
+from quad_nav.mission.sequencer import Sequencer
 from quad_nav.sim.contacts import CONTACT_GAP_S, Contact
 
 _SAME_BEGIN_S = CONTACT_GAP_S / 2
@@ -161,13 +163,17 @@ class RobotLog:
     def add_action(self, action: Action) -> Optional[Leg]:
         """Add an action of the sequencer; return the leg if the action ended one."""
         self._is_flying = not isinstance(action, SequenceDone)
-        if isinstance(action, SendGoal) and not action.resend_reason:
-            self._leg_start, self._leg_start_length_m = self._pose, self.path_length_m
-        if not isinstance(action, GoalEnded):
+        if isinstance(action, SendGoal):
+            if not action.resend_reason:
+                self._leg_start, self._leg_start_length_m = self._pose, self.path_length_m
             return None
-        leg = self._present_leg(action)
-        self.legs.append(leg)
-        return leg
+        if isinstance(action, GoalEnded):
+            leg = self._present_leg(action)
+            self.legs.append(leg)
+            return leg
+        if isinstance(action, SequenceDone):
+            return None
+        assert_never(action)
 
     def all_legs(self, sequencer: Sequencer, now_s: float) -> List[Leg]:
         """Return the legs flown, the one that is interrupted now and those that were not sent."""

@@ -18,9 +18,10 @@ import dataclasses
 import enum
 import math
 from dataclasses import dataclass
-from typing import List, Optional, Sequence, Union
+from typing import List, Optional, Sequence
 
 from quad_nav.geometry import Pose2D
+from quad_nav.mission.actions import Action, GoalEnded, SendGoal, SequenceDone
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.goal_file import GoalSequence
 from quad_nav.mission.progress import START, ActiveGoal, Dwell, SequenceProgress
@@ -50,46 +51,6 @@ class NavigatorReport:
 
     verdict: Verdict
     text: str = ""
-
-
-@dataclass(frozen=True)
-class SendGoal:
-    """Action: send ``pose`` to the navigator.
-
-    ``resend_reason`` says why the goal is sent again; it is empty the first time.
-    """
-
-    index: int
-    lap: int
-    pose: Pose2D
-    attempt: int
-    resend_reason: str = ""
-
-
-@dataclass(frozen=True)
-class GoalEnded:
-    """Action: a goal is reached, or skipped for ``reason``.
-
-    ``time_s`` is the time since it was first sent, ``yaw_error_rad`` the robot's yaw less the
-    goal's; None for a goal without yaw. The robot stays for the goal's ``wait_s`` afterwards.
-    """
-
-    index: int
-    lap: int
-    goal: Goal
-    reached: bool
-    time_s: float
-    attempts: int
-    reason: str = ""
-    yaw_error_rad: Optional[float] = None
-
-
-@dataclass(frozen=True)
-class SequenceDone:
-    """Action: all goals have ended."""
-
-
-Action = Union[SendGoal, GoalEnded, SequenceDone]
 
 
 class Sequencer:

@@ -18,9 +18,9 @@ from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.loop import inspection, offline_setup, shares_of
 from quad_nav.loop.flight_loop import FlightLoop
 from quad_nav.loop.navigator_group import LocatedScan, LoopRobot
+from quad_nav.mission.actions import Action, SendGoal
 from quad_nav.mission.flight_log import FlightLog
 from quad_nav.mission.goal_file import GoalSequence
-from quad_nav.mission.sequencer import Action, SendGoal
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.offline.flight_robot import FlightRobot, GoalWatch
 from quad_nav.scenario.flight_setup import FlightSetup

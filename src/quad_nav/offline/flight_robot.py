@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from quad_nav.config import Configuration
 from quad_nav.geometry import Pose2D
+from quad_nav.mission.actions import Action, SendGoal
 from quad_nav.mission.flight_log import FlightLog
 from quad_nav.mission.robot_goals import RobotGoals
-from quad_nav.mission.sequencer import Action, NavigatorReport, SendGoal, Sequencer, Verdict
+from quad_nav.mission.sequencer import NavigatorReport, Sequencer, Verdict
 from quad_nav.navigator.tick import State, Tick
 
 _SLACK_M, _SLACK_S = 1e-6, 1e-6

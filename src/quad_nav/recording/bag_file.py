@@ -12,7 +12,7 @@ from rosbags.rosbag1 import Reader, ReaderError
 
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import open_file
-from quad_nav.recording.messages import decode
+from quad_nav.recording.messages import decode, definition
 
 TopicFilter = Callable[[str, str], bool]
 """Returns true for topics to read, given the topic and its type, such as ``nav_msgs/Path``."""
@@ -99,6 +99,13 @@ def _read(path: Path, wanted: TopicFilter) -> Iterator[_Raw]:
         for connection in reader.connections:
             kind = message_kind(connection.msgtype)
             if wanted(connection.topic, kind):
+                if kind.startswith("quad/") and connection.digest != definition(kind)[1]:
+                    raise InputError(
+                        [
+                            f"{path}: {connection.topic}: {kind} has another definition, expected"
+                            " that of this version; read it with the version that made it"
+                        ]
+                    )
                 kinds[connection.id] = kind
         connections = [c for c in reader.connections if c.id in kinds]
         if connections:  # an empty list would mean all of them

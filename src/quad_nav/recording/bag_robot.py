@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, List, Mapping, Tuple
+from typing import Any, List, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D, Pose3D, yaw_from_quaternion
-from quad_nav.mission.goal import read_goal
 from quad_nav.navigator.tick import State
+from quad_nav.recording.bag_checks import checked_pose, require_finite
 from quad_nav.recording.bag_file import Message
-from quad_nav.recording.bag_info import checked_pose, require_finite
 from quad_nav.recording.messages import pose_from, stamp_ns
-from quad_nav.recording.trace import GoalTrace, RobotTrace
-from quad_nav.topics.right_of_way import RightOfWay, right_of_way_from_values
+from quad_nav.recording.trace import RobotTrace, goal_traces
+from quad_nav.topics.flight_info import RobotInfo
+from quad_nav.topics.mission_events import MissionEvent
+from quad_nav.topics.right_of_way import RightOfWay, right_of_way_from_message
 
 _STATES = {state.value: state for state in State}
 
@@ -38,7 +39,7 @@ class BagRobot:
         self._plans: List[Tuple[float, NDArray[np.float64]]] = []
         self._states: List[Tuple[float, State]] = []
         self._recoveries: List[Tuple[float, str]] = []
-        self._goals: List[Dict[str, Any]] = []
+        self._events: List[MissionEvent] = []
 
     @property
     def has_odometry(self) -> bool:
@@ -67,10 +68,7 @@ class BagRobot:
         Raises:
             ValueError: A value is missing or invalid.
         """
-        status = message.content
-        right = right_of_way_from_values(
-            status.message, {pair.key: pair.value for pair in status.values}
-        )
+        right = right_of_way_from_message(message.content)
         self._rights_of_way.append((message.stamp_ns / 1e9, right))
 
     def add_odometry(self, message: Message) -> None:
@@ -149,32 +147,21 @@ class BagRobot:
             (_seconds(status.pose_stamped.header), status.recovery_behavior_name)
         )
 
-    def add_event(self, event: Dict[str, Any]) -> None:
-        """Add an event of the sequencer, as ``checked_event`` returns it."""
-        if event["event"] == "sent" and not event["why"]:
-            self._goals.append(event)
-        elif event["event"] == "ended" and self._goals:
-            self._goals[-1] = {
-                **self._goals[-1],
-                "ended_s": event["time_s"],
-                "reached": event["reached"],
-                "reason": event["reason"],
-                "attempts": event["attempts"],
-                "yaw_error_rad": event["yaw_error_rad"],
-            }
+    def add_event(self, event: MissionEvent) -> None:
+        """Add an event of the sequencer."""
+        self._events.append(event)
 
-    def trace(self, number: int, start_s: float, info: Mapping[str, Any]) -> RobotTrace:
+    def trace(self, start_s: float, info: RobotInfo) -> RobotTrace:
         """Build the trace.
 
         Args:
-            number: Number of the robot.
             start_s: Start of the flight on the recording's clock.
-            info: The robot's entry of ``/quad/flight``.
+            info: What ``/quad/flight`` says of the robot.
         """
         moves = np.array(self._moves)
         commands = np.array(self._commands).reshape(-1, 4)
         return RobotTrace(
-            info.get("name", f"quad{number}"),
+            info.name,
             moves[:, 0] - start_s,
             moves[:, 1:4],
             moves[:, 4:8],
@@ -186,27 +173,12 @@ class BagRobot:
             tuple((time_s - start_s, plan) for time_s, plan in self._plans),
             tuple((time_s - start_s, state) for time_s, state in self._states),
             tuple((time_s - start_s, name) for time_s, name in self._recoveries),
-            tuple(_goal(event, start_s) for event in self._goals),
-            info.get("parameters", {}),
-            tuple(map(read_goal, info.get("goals", ()))),
+            goal_traces(self._events, start_s),
+            info.parameters,
+            info.goals,
             tuple((time_s - start_s, pose) for time_s, pose in self._odom_frames),
             tuple((time_s - start_s, right) for time_s, right in self._rights_of_way),
         )
-
-
-def _goal(event: Mapping[str, Any], start_s: float) -> GoalTrace:
-    ended_s = event.get("ended_s")
-    return GoalTrace(
-        event["goal"],
-        event["lap"],
-        Pose2D(event["x_m"], event["y_m"], event["yaw_rad"]),
-        event["time_s"] - start_s,
-        None if ended_s is None else ended_s - start_s,
-        event.get("reached", False),
-        event.get("reason", ""),
-        event.get("attempts", 1),
-        event.get("yaw_error_rad"),
-    )
 
 
 def _planar(pose: Any) -> Tuple[float, float, float]:

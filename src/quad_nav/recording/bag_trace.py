@@ -10,24 +10,17 @@ import functools
 import re
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterator, List, Optional, Tuple
+from typing import Callable, Dict, Iterator, List, Optional, Tuple
 
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import limit_memory
+from quad_nav.recording.bag_checks import checked_pose
 from quad_nav.recording.bag_file import (
     FlightClock,
     Message,
     Progress,
     no_progress,
     read_messages,
-)
-from quad_nav.recording.bag_info import (
-    MAX_ROBOTS,
-    MAX_SECONDS,
-    checked_event,
-    checked_flight,
-    checked_pose,
-    require_finite,
 )
 from quad_nav.recording.bag_people import read_people
 from quad_nav.recording.bag_robot import BagRobot
@@ -36,20 +29,20 @@ from quad_nav.recording.trace import FlightTrace
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.crowd_record import CrowdRecord
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
-from quad_nav.sim.scene_file import scene_from_document
+from quad_nav.topics.contacts import CONTACTS_TOPIC, contact_from_message
 from quad_nav.topics.flight_info import (
-    CONTACT_STATUS,
-    EVENTS_TOPIC,
     FLIGHT_TOPIC,
-    contact_from_values,
-    from_text,
+    MAX_ROBOTS,
+    FlightInfo,
+    RobotInfo,
+    flight_info_from_message,
 )
+from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event_from_message
 
 MAX_MEMORY_BYTES = 4 * 10**9
 """Limit for reading a recording: unpacked, it may be a thousand times larger."""
 LONGEST_FLIGHT_S = 30 * 24 * 3600.0
 """Longer flights are refused: two clocks in one recording differ by decades."""
-_CONTACTS_TOPIC = "/simulation/contacts"
 # Topic, type, and the method of ``BagRobot`` that adds its messages.
 _ROBOT_TOPICS: Tuple[Tuple[str, str, Callable[[BagRobot, Message], None]], ...] = (
     (r"/odom([0-9]{1,4})", "nav_msgs/Odometry", BagRobot.add_odometry),
@@ -68,7 +61,7 @@ _ROBOT_TOPICS: Tuple[Tuple[str, str, Callable[[BagRobot, Message], None]], ...] 
     ),
     (
         r"/move_base([0-9]{1,4})/right_of_way",
-        "diagnostic_msgs/DiagnosticStatus",
+        "quad/RightOfWay",
         BagRobot.add_right_of_way,
     ),
 )
@@ -114,8 +107,15 @@ def _limited_memory(path: Path) -> Iterator[None]:
 
 
 def _read(path: Path, progress: Progress) -> TraceReader:
+    def is_wanted(topic: str, kind: str) -> bool:
+        if topic in (FLIGHT_TOPIC, EVENTS_TOPIC) and kind == "std_msgs/String":
+            raise InputError(
+                [f"{path}: {topic}: is {kind}, as quad 0.2.0 records it; read it with that version"]
+            )
+        return _is_wanted(topic, kind)
+
     reader = TraceReader()
-    for message in read_messages(path, _is_wanted, progress):
+    for message in read_messages(path, is_wanted, progress):
         try:
             reader.add(message)
         except ValueError as error:
@@ -155,14 +155,14 @@ class TraceReader:
 
     Attributes:
         robots: Messages of each robot.
-        info: Facts of ``/quad/flight``.
+        info: Facts of ``/quad/flight``, merged.
         contacts: Contacts, at times on the recording's clock.
         clocks_ns: Time of recording, and time on ``/clock``, of each of its messages.
     """
 
     def __init__(self) -> None:
         self.robots: Dict[int, BagRobot] = {}
-        self.info: Dict[str, Any] = {}
+        self.info = FlightInfo()
         self.contacts: List[Contact] = []
         self.clocks_ns: List[Tuple[int, int]] = []
         self._clock_ns: Optional[int] = None
@@ -194,7 +194,7 @@ class TraceReader:
 
     def add_flight(self, message: Message) -> None:
         """Update the flight's information from ``/quad/flight``."""
-        self.info.update(checked_flight(from_text(message.content.data) or {}))
+        self.info = self.info.merged(flight_info_from_message(message.content))
 
     def set_clock(self, message: Message) -> None:
         """Update the recording's clock from ``/clock``."""
@@ -203,21 +203,14 @@ class TraceReader:
 
     def add_event(self, message: Message) -> None:
         """Add an event of ``/quad/events``."""
-        event = from_text(message.content.data)
-        if event is not None:
-            event = checked_event(event)
-            self._robot(event["robot"]).add_event(event)
+        time_s = stamp_ns(message.content.header.stamp) / 1e9
+        event = mission_event_from_message(message.content, time_s)
+        self._robot(event.robot).add_event(event)
 
     def add_contact(self, message: Message) -> None:
-        """Add a contact; diagnostics of other names are skipped."""
-        status = message.content
-        if status.name == CONTACT_STATUS:
-            contact = contact_from_values(
-                status.hardware_id, {pair.key: pair.value for pair in status.values}
-            )
-            require_finite((contact.x_m, contact.y_m))
-            require_finite((contact.time_s,), MAX_SECONDS)
-            self.contacts.append(contact)
+        """Add a contact."""
+        time_s = stamp_ns(message.content.header.stamp) / 1e9
+        self.contacts.append(contact_from_message(message.content, time_s))
 
     def add_transforms(self, message: Message) -> None:
         """Update the robots' odometry frames from ``/tf``."""
@@ -237,28 +230,29 @@ class TraceReader:
         Raises:
             InputError: The recording has no odometry, too long a flight or an invalid scene.
         """
-        scene = self._scene(path)
+        info = self.info
+        scene = info.read_scene(f"{path}: {FLIGHT_TOPIC}")
         robots = self._flown_robots(path)
         start_s = self.start_s
-        infos = self.info.get("robots", [])
+        infos = dict(enumerate(info.robots))
         traces = tuple(
-            robot.trace(number, start_s, infos[number] if number < len(infos) else {})
+            robot.trace(start_s, infos.get(number, RobotInfo(f"quad{number}")))
             for number, robot in robots.items()
         )
         contacts = tuple(
             Contact(c.time_s - start_s, c.robot, c.other, c.x_m, c.y_m) for c in self.contacts
         )
         return FlightTrace(
-            self.info.get("title", path.stem),
+            info.title or path.stem,
             traces,
             contacts,
             scene,
-            self.info.get("robot_radius_m", BODY_RADIUS_M),
-            self.info.get("seed"),
-            self.info.get("config", ""),
-            self.info.get("versions", {}),
-            self.info.get("reason", ""),
-            self.info.get("jitter_m"),
+            BODY_RADIUS_M if info.robot_radius_m is None else info.robot_radius_m,
+            info.seed,
+            info.config_name,
+            info.versions,
+            info.reason,
+            info.jitter_m,
             self._people(path, scene, max(one.times_s[-1] for one in traces)),
         )
 
@@ -266,8 +260,7 @@ class TraceReader:
     def start_s(self) -> float:
         """Start of the flight on the recording's clock; there must be odometry."""
         firsts_s = (robot.first_s for robot in self.robots.values() if robot.has_odometry)
-        given_s: Optional[float] = self.info.get("start_s")
-        return min(firsts_s) if given_s is None else given_s
+        return min(firsts_s) if self.info.start_s is None else self.info.start_s
 
     def _flown_robots(self, path: Path) -> Dict[int, BagRobot]:
         """Return the robots with odometry, by number, after a check of their times."""
@@ -299,25 +292,12 @@ class TraceReader:
         with _limited_memory(path):
             return read_people(path, scene, self.clock, end_s)
 
-    def _scene(self, path: Path) -> Optional[Scene]:
-        document = self.info.get("scene")
-        if document is None:
-            return None
-        if isinstance(document, dict) and {"world", "map"} & set(document):
-            raise InputError(
-                [
-                    f"{path}: {FLIGHT_TOPIC}: scene: refers to another file, expected the "
-                    "complete scene in the recording"
-                ]
-            )
-        return scene_from_document(document, f"{path}: {FLIGHT_TOPIC}: scene")
-
 
 _COMMON_TOPICS: Dict[Tuple[str, str], Callable[[TraceReader, Message], None]] = {
-    (FLIGHT_TOPIC, "std_msgs/String"): TraceReader.add_flight,
+    (FLIGHT_TOPIC, "quad/FlightInfo"): TraceReader.add_flight,
     ("/clock", "rosgraph_msgs/Clock"): TraceReader.set_clock,
-    (EVENTS_TOPIC, "std_msgs/String"): TraceReader.add_event,
-    (_CONTACTS_TOPIC, "diagnostic_msgs/DiagnosticStatus"): TraceReader.add_contact,
+    (EVENTS_TOPIC, "quad/MissionEvent"): TraceReader.add_event,
+    (CONTACTS_TOPIC, "quad/Contact"): TraceReader.add_contact,
     ("/tf", "tf2_msgs/TFMessage"): TraceReader.add_transforms,
     ("/tf_static", "tf2_msgs/TFMessage"): TraceReader.add_transforms,
 }

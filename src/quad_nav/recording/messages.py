@@ -1,6 +1,7 @@
 """Encode and decode ROS 1 messages without ROS.
 
-``rosbags`` knows the common message types; those of navigation are added here. A message is
+``rosbags`` knows the common message types; our own are read from ``msg/``, and those of navigation
+are added here. A message is
 one of its dataclasses with the fields in the order of the definition, for example
 ``message("geometry_msgs/Point", x, y, z)``. Stamps are in nanoseconds.
 """
@@ -15,8 +16,10 @@ from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from quad_nav.costmap.cost_grid import occupancy
+from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, quaternion_from_yaw
 from quad_nav.grid import GridSpec
+from quad_nav.topics.flight_info import FlightInfo
 from quad_nav.topics.markers import Marker
 
 _DEFINITIONS = {
@@ -49,7 +52,8 @@ _ZEROS_36 = np.zeros(36)
 def _store() -> Any:
     store = get_typestore(Stores.ROS1_NOETIC)
     types: Dict[str, Any] = {}
-    for name, text in _DEFINITIONS.items():
+    own = {f"quad/msg/{path.stem}": path.read_text() for path in shipped("msg").glob("*.msg")}
+    for name, text in {**_DEFINITIONS, **own}.items():
         types.update(get_types_from_msg(text, name))
     store.register(types)
     return store
@@ -142,6 +146,18 @@ def pose_stamped(at: Pose3D, frame: str, stamp: int) -> Any:
 def planar_pose(at: Pose2D, z_m: float = 0.0) -> Pose3D:
     """Convert a planar pose to an upright pose at height ``z_m``."""
     return Pose3D(at.x_m, at.y_m, z_m, quaternion_from_yaw(at.yaw_rad))
+
+
+def stamped(kind: str, fields: Mapping[str, Any], stamp: int, frame: str = "map") -> Any:
+    """Build a message of a type with a header from its other fields."""
+    return _message_class(kind)(header=header(frame, stamp), **fields)
+
+
+def flight_info(info: FlightInfo) -> Any:
+    """Build a ``quad/FlightInfo``."""
+    fields = info.fields
+    robots = [_message_class("quad/RobotInfo")(**robot) for robot in fields["robots"]]
+    return _message_class("quad/FlightInfo")(**{**fields, "robots": robots})
 
 
 def text(content: str) -> Any:
@@ -265,14 +281,6 @@ def grid_update(costs: NDArray[np.uint8], x0: int, y0: int, frame: str, stamp: i
         height,
         occupancy(costs).ravel(),
     )
-
-
-def diagnostic(
-    level: int, name: str, content: str, hardware_id: str, values: Mapping[str, str]
-) -> Any:
-    """Build a ``diagnostic_msgs/DiagnosticStatus``."""
-    pairs = [message("diagnostic_msgs/KeyValue", key, value) for key, value in values.items()]
-    return message("diagnostic_msgs/DiagnosticStatus", level, name, content, hardware_id, pairs)
 
 
 def marker_array(shown: Sequence[Marker], replaces_all: bool = False, stamp: int = 0) -> Any:

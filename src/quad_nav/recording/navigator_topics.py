@@ -20,7 +20,7 @@ from quad_nav.recording.action_topics import ActionTopics
 from quad_nav.recording.messages import plan_bytes
 from quad_nav.recording.record_file import TopicWriter, stamp_at
 from quad_nav.topics.publishing import CostmapSchedule
-from quad_nav.topics.right_of_way import RIGHT_OF_WAY_STATUS, RightOfWaySchedule
+from quad_nav.topics.right_of_way import RightOfWaySchedule
 from quad_nav.topics.tracked_obstacles import MARKERS_TOPIC, TrackSchedule, track_markers
 
 _NO_PLAN = np.zeros((0, 3))
@@ -34,7 +34,7 @@ class NavigatorTopics:
         navigator = hosted.navigator
         self._scan_filters, self._tracks = hosted.scan_filters, TrackSchedule()
         self.action = ActionTopics(robot, topics, navigator.global_costmap.params.global_frame)
-        self._robot, self._topics = f"quad{robot}", topics
+        self._topics = topics
         self._navigator = navigator
         self._node = f"/move_base{robot}"
         self._command_topic = f"/cmd_vel{robot}"
@@ -83,10 +83,8 @@ class NavigatorTopics:
     def _write_right_of_way(self, tick: Tick, stamp: int) -> None:
         changed = self._right_of_way.pop(tick)
         if changed is not None:
-            status = messages.diagnostic(
-                0, RIGHT_OF_WAY_STATUS, changed.text, self._robot, changed.values
-            )
-            self._write("right_of_way", stamp, status, latched=True)
+            content = messages.stamped("quad/RightOfWay", changed.fields, stamp)
+            self._write("right_of_way", stamp, content, latched=True)
 
     def _write_obstacles(self, now_s: float, stamp: int) -> None:
         tracks = self._tracks.pop(now_s, self._scan_filters.tracks(now_s))

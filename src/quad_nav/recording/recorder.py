@@ -8,23 +8,22 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any, Dict, List
+from typing import Any, List
 
 from quad_nav.geometry import Pose3D, Scan
-from quad_nav.mission.sequencer import Action, SendGoal
+from quad_nav.mission.actions import Action, SendGoal
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.recording import messages
 from quad_nav.recording.messages import path_bytes, pose_bytes
 from quad_nav.recording.navigator_topics import NavigatorTopics
 from quad_nav.recording.record_file import START_NS, TopicWriter, create, stamp_at
-from quad_nav.scenario.rules import START_S
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.odometry import pose_in
 from quad_nav.sim.robot_state import RobotState
-from quad_nav.topics import flight_info
-from quad_nav.topics.flight_info import CONTACT_STATUS, contact_values
+from quad_nav.topics.contacts import CONTACTS_TOPIC, contact_fields
+from quad_nav.topics.flight_info import FLIGHT_TOPIC, FlightInfo, mission_info, simulation_info
 from quad_nav.topics.markers import (
     OBSTACLES_PERIOD_S,
     OBSTACLES_TOPIC,
@@ -34,6 +33,7 @@ from quad_nav.topics.markers import (
     quadcopter_markers,
     scene_markers,
 )
+from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event
 from quad_nav.topics.publishing import FlownPath
 
 _SIMULATOR, _SEQUENCER = "/simulator", "/sequencer"
@@ -92,21 +92,10 @@ class Recorder(FlightObserver):
         self.on_move(flight)
 
     def on_contact(self, contact: Contact) -> None:
-        """Write a contact as a diagnostic."""
+        """Write a contact."""
         stamp = stamp_at(contact.time_s)
-        level = messages.constant("diagnostic_msgs/DiagnosticStatus", "WARN")
-        self._write(
-            "/simulation/contacts",
-            stamp,
-            messages.diagnostic(
-                level,
-                CONTACT_STATUS,
-                str(contact),
-                contact.robot,
-                contact_values(contact, contact.time_s + START_S),
-            ),
-            _SIMULATOR,
-        )
+        content = messages.stamped("quad/Contact", contact_fields(contact), stamp)
+        self._write(CONTACTS_TOPIC, stamp, content, _SIMULATOR)
 
     def on_scan(self, robot: int, scan: Scan, map_from_lidar: Pose3D) -> None:
         """Write a LIDAR scan."""
@@ -142,13 +131,9 @@ class Recorder(FlightObserver):
 
     def on_action(self, robot: int, now_s: float, action: Action) -> None:
         """Write an action of the sequencer."""
-        info = flight_info.event(robot, now_s + START_S, action)
-        self._write(
-            flight_info.EVENTS_TOPIC,
-            stamp_at(now_s),
-            messages.text(flight_info.to_text(info)),
-            _SEQUENCER,
-        )
+        stamp, event = stamp_at(now_s), mission_event(robot, now_s, action)
+        content = messages.stamped("quad/MissionEvent", event.fields, stamp)
+        self._write(EVENTS_TOPIC, stamp, content, _SEQUENCER)
         if isinstance(action, SendGoal):
             self._navigators[robot].action.send(now_s, action.pose)
         self._write_goals(now_s)
@@ -206,24 +191,15 @@ class Recorder(FlightObserver):
     def _write_flight(self) -> None:
         flight = self._flight
         setup = flight.setup
-        info: Dict[str, Any] = {
-            "title": self._title,
-            "config": setup.config_name,
-            "reason": flight.reason,
-            **flight_info.simulation_info(setup.scene, setup.seed, setup.simulation.jitter_m),
-            **flight_info.mission_info(
-                {robot.name: robot.sequencer.sequence for robot in flight.robots},
-                [robot.configuration.to_tree() for robot in flight.robots],
-                setup.robot_radius_m,
-            ),
-        }
-        self._write(
-            flight_info.FLIGHT_TOPIC,
-            stamp_at(flight.now_s),
-            messages.text(flight_info.to_text(info)),
-            _SIMULATOR,
-            latched=True,
+        info = FlightInfo(self._title, setup.config_name, flight.reason)
+        info = info.merged(simulation_info(setup.scene, setup.seed, setup.simulation.jitter_m))
+        mission = mission_info(
+            {robot.name: robot.sequencer.sequence for robot in flight.robots},
+            [robot.configuration.to_tree() for robot in flight.robots],
+            setup.robot_radius_m,
         )
+        content = messages.flight_info(info.merged(mission))
+        self._write(FLIGHT_TOPIC, stamp_at(flight.now_s), content, _SIMULATOR, latched=True)
 
     def _write_goals(self, now_s: float) -> None:
         sequencers = [robot.sequencer for robot in self._flight.robots]

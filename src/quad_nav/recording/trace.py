@@ -5,23 +5,24 @@ A trace comes from a running flight (``TraceObserver``) or from a recording (``b
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, List, Mapping, Optional, Tuple
+from typing import Any, Iterable, List, Mapping, Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.config.differences import known_parameters
 from quad_nav.geometry import Pose2D
+from quad_nav.mission.actions import Action, Event
 from quad_nav.mission.goal import Goal
-from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
 from quad_nav.navigator.tick import RobotPoses, State, Tick
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.crowd_record import CrowdRecord
 from quad_nav.sim.movers import Movers
 from quad_nav.sim.scene import Scene
+from quad_nav.topics.mission_events import MissionEvent, mission_event
 from quad_nav.topics.right_of_way import RightOfWay
 from quad_nav.versions import versions
 
@@ -43,6 +44,31 @@ class GoalTrace:
     reason: str = ""
     attempts: int = 1
     yaw_error_rad: Optional[float] = None
+
+
+def goal_traces(events: Iterable[MissionEvent], start_s: float = 0.0) -> Tuple[GoalTrace, ...]:
+    """Return the flights to the goals of one robot; times count from ``start_s``.
+
+    The end of a goal that was not seen to be sent, as in a recording that was started later, is
+    left out.
+    """
+    goals: List[GoalTrace] = []
+    for event in events:
+        if event.event is Event.SENT and event.pose is not None:
+            if not event.reason:
+                goals.append(GoalTrace(event.goal, event.lap, event.pose, event.time_s - start_s))
+        elif event.event in (Event.REACHED, Event.SKIPPED) and goals:
+            last = goals[-1]
+            if last.ended_s is None and (last.index, last.lap) == (event.goal, event.lap):
+                goals[-1] = replace(
+                    last,
+                    ended_s=event.time_s - start_s,
+                    reached=event.event is Event.REACHED,
+                    reason=event.reason,
+                    attempts=event.attempts,
+                    yaw_error_rad=event.yaw_error_rad,
+                )
+    return tuple(goals)
 
 
 @dataclass(frozen=True)
@@ -125,7 +151,7 @@ class _RobotRecord:
         self.plans: List[Tuple[float, NDArray[np.float64]]] = []
         self.states: List[Tuple[float, State]] = []
         self.recoveries: List[Tuple[float, str]] = []
-        self.goals: List[GoalTrace] = []
+        self.events: List[MissionEvent] = []
         self.velocities: List[Tuple[float, float, float]] = []
 
 
@@ -162,23 +188,8 @@ class TraceObserver(FlightObserver):
             record.velocities.append((twist.vx_mps, twist.vy_mps, twist.vyaw_radps))
 
     def on_action(self, robot: int, now_s: float, action: Action) -> None:
-        """Add a goal that was sent or ended."""
-        goals = self._robots[robot].goals
-        if isinstance(action, SendGoal) and not action.resend_reason:
-            goals.append(GoalTrace(action.index, action.lap, action.pose, now_s))
-        elif isinstance(action, GoalEnded):
-            last = goals[-1]
-            goals[-1] = GoalTrace(
-                last.index,
-                last.lap,
-                last.pose,
-                last.sent_s,
-                now_s,
-                action.reached,
-                action.reason,
-                action.attempts,
-                action.yaw_error_rad,
-            )
+        """Add an action of the sequencer."""
+        self._robots[robot].events.append(mission_event(robot, now_s, action))
 
     def on_tick(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
         """Add the results of a navigator's tick."""
@@ -241,7 +252,7 @@ class TraceObserver(FlightObserver):
                     tuple(record.plans),
                     tuple(record.states),
                     tuple(record.recoveries),
-                    tuple(record.goals),
+                    goal_traces(record.events),
                     known_parameters(robot.configuration.to_tree()),
                 )
             )

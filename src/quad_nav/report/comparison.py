@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Callable, List, Optional, Sequence, Tuple
 
 from quad_nav.report.compared_flight import (
@@ -16,7 +15,7 @@ from quad_nav.report.compared_flight import (
 from quad_nav.report.flight_metrics import FlightMetrics
 from quad_nav.report.matplotlib_figures import paths_picture
 from quad_nav.report.metrics_picture import grouped, metrics_picture
-from quad_nav.report.page import Page, Section, picture, render, write_page
+from quad_nav.report.page import Page, Section, picture, render
 from quad_nav.report.paths import MOST_OVERLAID, overlaid_paths
 from quad_nav.report.plotly_figures import paths_plot
 
@@ -145,10 +144,3 @@ def _dots(metrics: Sequence[FlightMetrics]) -> Section:
         "A dot is a flight. Boxes span the middle half of five or more flights, with the median.",
         (picture("comparison", "Metrics of each flight", lambda: metrics_picture(metrics)),),
     )
-
-
-def write_comparison(
-    flights: Sequence[ComparedFlight], path: Path, pictures: Optional[Path] = None
-) -> None:
-    """Write the report that compares several flights, as ``write_report`` does."""
-    write_page(comparison_page(flights), path, pictures)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from typing import List, Optional, Sequence
 
 from quad_nav.config.difference_table import parameter_rows
@@ -15,7 +14,7 @@ from quad_nav.report.encounters import CLOSE_M, LETTERS, Encounter, encounters, 
 from quad_nav.report.flight_metrics import FlightMetrics, flight_metrics
 from quad_nav.report.matplotlib_figures import distance_picture, paths_picture, timeline_picture
 from quad_nav.report.measures import Tracks, resampled_tracks
-from quad_nav.report.page import MAX_STRIPS, Page, Section, picture, render, write_page
+from quad_nav.report.page import MAX_STRIPS, Page, Section, picture, render
 from quad_nav.report.paths import flown_paths
 from quad_nav.report.plotly_figures import distance_plot, paths_plot, timeline_plot
 from quad_nav.report.robot_picture import cycle_picture, has_wall_times, motion_picture
@@ -183,20 +182,3 @@ def _rows_to_show(flight: FlightMetrics) -> List[int]:
         )
 
     return sorted(sorted(range(len(flight.robots)), key=min_distance_m)[: style.MAX_ROWS])
-
-
-def write_report(
-    trace: FlightTrace,
-    path: Path,
-    pictures: Optional[Path] = None,
-    wall_time_s: Optional[float] = None,
-) -> None:
-    """Write the report of one flight; folders are created.
-
-    Args:
-        trace: Trace of the flight.
-        path: HTML file.
-        pictures: Folder that gets every picture as a PNG and an SVG file, or None.
-        wall_time_s: How long the flight took, if known.
-    """
-    write_page(flight_page(trace, wall_time_s), path, pictures)

@@ -115,15 +115,13 @@ def _number(value: Optional[float], decimals: int = 2) -> str:
     return "–" if value is None else f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
-def write_page(page: Page, path: Path, pictures: Optional[Path] = None) -> None:
-    """Write the HTML atomically, and its pictures to a folder, if given.
+def write_page(page: Page, path: Path) -> None:
+    """Write the HTML atomically.
 
     Raises:
         OSError: A file cannot be written.
     """
     write_text(path, page.html)
-    if pictures is not None:
-        write_pictures(page, pictures)
 
 
 def write_pictures(page: Page, folder: Path) -> None:

@@ -15,9 +15,12 @@ from typing import Any, Dict, Tuple
 import numpy as np
 
 from quad_nav import config
+from quad_nav.config.robot_tree import RobotSource, robot_tree
 from quad_nav.control.trajectory_planner import TrajectoryPlanner
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.scan_filter import ScanFilters, ScanSituation
+from quad_nav.errors import InputError
+from quad_nav.files.shipped import config_names
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import RobotPoses
@@ -67,9 +70,10 @@ def warm_up(configuration: config.Configuration) -> None:
     _add_scans(navigator, here)
     _filter_scans(filters, here)
     navigator.set_goal(Pose2D(here.x_m + _AHEAD_M, here.y_m), 0.0)
+    tracks = filters.tracks(1.0)
     for now_s in (0.0, 0.5):
-        navigator.tick(now_s, RobotPoses(here, here), Twist2D(vx_mps=0.1))
-    peers, tracks = [_oncoming_peer(here, 1.0)], filters.tracks(1.0)
+        navigator.tick(now_s, RobotPoses(here, here), Twist2D(vx_mps=0.1), (), tracks)
+    peers = [_oncoming_peer(here, 1.0)]
     navigator.tick(1.0, RobotPoses(here, here), Twist2D(vx_mps=0.1), peers, tracks)
     _add_scans(navigator, here)  # again, with the points of a peer to remove
     if isinstance(navigator.controller, TrajectoryPlanner) and navigator.controller.rollout:
@@ -80,7 +84,7 @@ def _filter_scans(filters: ScanFilters, here: Pose2D) -> None:
     """Show the filters an obstacle that crosses free space, so that they call every kernel."""
     lidar = Pose3D(here.x_m, here.y_m, 1.0)
     for step in range(12):
-        now_s, heights_m = 0.0833 * step, (-math.inf, math.inf)
+        now_s, heights_m = 0.1 * step - 0.2, (-math.inf, math.inf)
         ranges = np.full(256, 6.0, np.float32)
         ranges[100 + 4 * step : 112 + 4 * step] = 3.0
         scan = Scan(now_s, -math.pi, 2 * math.pi / 256, 0.02, 60.0, ranges)
@@ -161,5 +165,16 @@ def fly_missions() -> None:
         )
 
 
+def fly_shipped() -> None:
+    """Warm up each shipped configuration, with the filters of the add-ons that are installed."""
+    for name in config_names():
+        try:
+            configuration = config.load(robot_tree(RobotSource(name, 0)))
+        except InputError:  # its add-on is not installed
+            continue
+        warm_up(configuration)
+
+
 if __name__ == "__main__":
     fly_missions()
+    fly_shipped()

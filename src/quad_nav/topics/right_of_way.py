@@ -1,22 +1,29 @@
 """What a robot does for its peers, as `/move_base{i}/right_of_way` tells it.
 
-The topic holds one latched `diagnostic_msgs/DiagnosticStatus`, published on each change. This
-module has its values and decides when it changes; `docs/topics.md` lists them.
+The topic holds one latched ``quad/RightOfWay``, published on each change. This module has its
+fields and decides when it changes.
 """
 
 from __future__ import annotations
 
+import enum
 from dataclasses import dataclass
-from typing import Dict, Mapping, Optional, Tuple
+from typing import Any, Dict, Optional, Tuple
 
-from quad_nav.errors import excerpt
+from quad_nav.geometry import Pose2D
 from quad_nav.navigator.tick import Tick
-from quad_nav.peers.right_of_way import Yield
-from quad_nav.topics.validation import MAX_FRAME_ID, MAX_MAGNITUDE
+from quad_nav.peers.right_of_way import Yield, YieldDecision
+from quad_nav.topics.validation import MAX_FRAME_ID, MAX_MAGNITUDE, shown_text
 
-RIGHT_OF_WAY_STATUS = "right of way"
-FREE, WAITS, MAKES_ROOM, LIMITED = "", "waits", "makes room", "limited"
-_KIND_OF = {Yield.WAIT: WAITS, Yield.MAKE_ROOM: MAKES_ROOM}
+
+class Kind(enum.IntEnum):
+    """What a robot does, numbered as in ``quad/RightOfWay``."""
+
+    FREE, WAITS, MAKES_ROOM, LIMITED = range(4)
+
+
+_KIND_OF = {Yield.WAIT: Kind.WAITS, Yield.MAKE_ROOM: Kind.MAKES_ROOM}
+_YIELD_OF = {kind: action for action, kind in _KIND_OF.items()}
 
 
 @dataclass(frozen=True)
@@ -24,30 +31,40 @@ class RightOfWay:
     """What a robot does for its peers at present.
 
     Attributes:
-        kind: `FREE`, `WAITS`, `MAKES_ROOM` or `LIMITED`, when only its command is limited.
+        kind: What it does; `LIMITED` if only its command is limited.
         peer: Name of the robot that goes first or limits the command, "" if free.
         hold_m: Holding point (x, y) in ``map``, None without one.
         limited_by: Name of the robot whose Voronoi cell limits the command, "" if none does.
         text: One line for people.
     """
 
-    kind: str = FREE
+    kind: Kind = Kind.FREE
     peer: str = ""
     hold_m: Optional[Tuple[float, float]] = None
     limited_by: str = ""
     text: str = "free"
 
     @property
-    def values(self) -> Dict[str, str]:
-        """The diagnostic values."""
-        x_m, y_m = map(repr, self.hold_m) if self.hold_m is not None else ("", "")
+    def fields(self) -> Dict[str, Any]:
+        """The fields of a ``quad/RightOfWay``, apart from its header."""
+        x_m, y_m = (0.0, 0.0) if self.hold_m is None else self.hold_m
         return {
-            "kind": self.kind,
+            "kind": int(self.kind),
             "peer": self.peer,
-            "hold_x_m": x_m,
-            "hold_y_m": y_m,
+            "has_hold": self.hold_m is not None,
+            "hold_x": x_m,
+            "hold_y": y_m,
             "limited_by": self.limited_by,
+            "text": self.text,
         }
+
+    @property
+    def decision(self) -> Optional[YieldDecision]:
+        """The decision to yield; None if the robot does not yield."""
+        action = _YIELD_OF.get(self.kind)
+        if action is None:
+            return None
+        return YieldDecision(self.peer, action, self.hold_m and Pose2D(*self.hold_m))
 
 
 class RightOfWaySchedule:
@@ -74,38 +91,24 @@ def _of(tick: Tick, limited_by: str) -> RightOfWay:
     if decision is None:
         if not limited_by:
             return RightOfWay()
-        return RightOfWay(LIMITED, limited_by, None, limited_by, f"limited by {limited_by}")
+        return RightOfWay(Kind.LIMITED, limited_by, None, limited_by, f"limited by {limited_by}")
     point = decision.holding_point
     hold_m = None if point is None else (float(point.x_m), float(point.y_m))
     kind = _KIND_OF[decision.action]
     return RightOfWay(kind, decision.peer, hold_m, limited_by, str(decision))
 
 
-def right_of_way_from_values(text: str, values: Mapping[str, str]) -> RightOfWay:
-    """Read a right of way from its diagnostic values.
-
-    Args:
-        text: The line for people.
-        values: Values by their keys.
+def right_of_way_from_message(message: Any) -> RightOfWay:
+    """Read a ``quad/RightOfWay``, of rospy or of a recording.
 
     Raises:
-        ValueError: If a value is missing or not valid.
+        ValueError: A field is not valid.
     """
-    try:
-        kind, peer, limited_by = values["kind"], values["peer"], values["limited_by"]
-        x_text, y_text = values["hold_x_m"], values["hold_y_m"]
-        hold_m = (float(x_text), float(y_text)) if x_text or y_text else None
-    except (KeyError, ValueError) as error:
-        raise ValueError(
-            f"right of way has no valid {error}; expected the values kind, peer, hold_x_m,"
-            " hold_y_m, limited_by"
-        ) from error
-    if kind not in (FREE, WAITS, MAKES_ROOM, LIMITED):
-        raise ValueError(
-            f"kind '{excerpt(kind)}', expected '{WAITS}', '{MAKES_ROOM}', '{LIMITED}' or ''"
-        )
-    if hold_m is not None and not all(abs(one) <= MAX_MAGNITUDE for one in hold_m):
+    hold_m = (float(message.hold_x), float(message.hold_y)) if message.has_hold else None
+    if hold_m is not None and not all(abs(value) <= MAX_MAGNITUDE for value in hold_m):
         raise ValueError(f"holding point {hold_m}, expected finite coordinates")
-    if max(len(peer), len(limited_by)) > MAX_FRAME_ID:
+    if max(len(message.peer), len(message.limited_by)) > MAX_FRAME_ID:
         raise ValueError(f"a name is longer than {MAX_FRAME_ID} characters")
-    return RightOfWay(kind, peer, hold_m, limited_by, text)
+    return RightOfWay(
+        Kind(message.kind), message.peer, hold_m, message.limited_by, shown_text(message.text)
+    )

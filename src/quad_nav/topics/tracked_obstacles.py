@@ -1,17 +1,13 @@
-"""Tracked moving obstacles as topics: markers for people, and a point cloud for programs.
+"""Tracked moving obstacles as topics: markers for people, ``quad/MovingObstacles`` for programs.
 
 The page in the browser shows the rows that ``rows_of_markers`` reads from the markers.
-
-No message for tracked objects is packaged for both Debian 12 and ROS Noetic: ``vision_msgs``,
-``people_msgs`` and ``costmap_converter`` are not on the former. A ``sensor_msgs/PointCloud2`` is
-everywhere, has all obstacles of one time in one message, and its fields have names.
 """
 
 from __future__ import annotations
 
 import math
 from enum import IntEnum
-from typing import Any, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,19 +17,8 @@ from quad_nav.timing import Schedule
 from quad_nav.topics.markers import ARROW, CYLINDER, TEXT, Marker, Rgba
 from quad_nav.topics.validation import MAX_MAGNITUDE
 
-MARKERS_TOPIC, CLOUD_TOPIC = "moving_obstacles", "moving_obstacles_cloud"
+MARKERS_TOPIC, TRACKS_TOPIC = "moving_obstacles", "moving_obstacle_tracks"
 """Names below ``/move_base{i}``."""
-CLOUD_FIELDS = (
-    "x",
-    "y",
-    "z",
-    "vx",
-    "vy",
-    "radius",
-    "number",
-    *(f"cov_{row}_{column}" for row in ("x", "y", "vx", "vy") for column in ("x", "y", "vx", "vy")),
-)
-"""Fields of the cloud, float32: metres, metres per second; ``number`` is the track's."""
 RATE_HZ = 10.0
 SIGMAS = 2.0
 """Half axes of the ellipse of the position, in standard deviations."""
@@ -169,14 +154,22 @@ def ellipse(covariance: NDArray[np.float64]) -> Tuple[Tuple[float, float], float
     return axes, 0.5 * math.atan2(2.0 * xy, xx - yy)
 
 
-def cloud_rows(tracks: Tracks) -> NDArray[np.float32]:
-    """Return the points of the cloud, float32[n, 23], columns as in ``CLOUD_FIELDS``."""
-    count = len(tracks)
-    rows = np.zeros((count, len(CLOUD_FIELDS)), np.float32)
-    rows[:, :2], rows[:, 3:5] = tracks.states[:, :2], tracks.states[:, 2:]
-    rows[:, 5], rows[:, 6] = tracks.radii_m, tracks.numbers
-    rows[:, 7:] = tracks.covariances.reshape(count, 16)
-    return rows
+def obstacle_fields(tracks: Tracks) -> List[Dict[str, Any]]:
+    """Return the fields of a ``quad/MovingObstacle`` for each track; suspects have none."""
+    return [
+        {
+            "number": number % 2**32,
+            **dict(zip(("x", "y", "vx", "vy"), state)),
+            "radius": radius_m,
+            "covariance": covariance.ravel(),
+        }
+        for number, state, radius_m, covariance in zip(
+            tracks.numbers.tolist(),
+            tracks.states.tolist(),
+            tracks.radii_m.tolist(),
+            tracks.covariances,
+        )
+    ]
 
 
 def track_rows(tracks: Tracks) -> NDArray[np.float64]:

@@ -35,7 +35,14 @@ MAX_LEAD_S = 1.0
 MAX_STAMP_S = 2.0**31 - 3600.0
 """Largest accepted stamp, in 2038: tf2 aborts when two stamps are 2**31 s apart."""
 MIN_RESOLUTION_M, MAX_RESOLUTION_M = 1e-3, 100.0
+MAX_TEXT = 10_000
+"""Characters of a text that are kept."""
 _PLANAR = [0, 1, 5]  # vx, vy and vyaw of a twist
+
+
+def shown_text(text: str) -> str:
+    """Return a text without unprintable characters, which would break text output."""
+    return "".join(c for c in text[:MAX_TEXT] if c.isprintable() or c == "\n")
 
 
 def stamp_problem(stamp_s: float, now_s: float) -> str:

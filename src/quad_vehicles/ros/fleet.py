@@ -13,8 +13,8 @@ from functools import partial
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Set, Tuple
 
 import rospy
-from diagnostic_msgs.msg import DiagnosticStatus
-from std_msgs.msg import Empty, String
+from quad.msg import MissionEvent, VehicleState
+from std_msgs.msg import Empty
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from quad_nav.errors import InputError, printable
@@ -27,12 +27,14 @@ from quad_nav.files.values import (
     text,
     value_faults,
 )
+from quad_nav.mission.actions import Event
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.scene_file import load_scene, outside_problem
-from quad_nav.topics.flight_info import EVENTS_TOPIC, from_text
-from quad_nav.topics.vehicle_states import IN_FLIGHT, ON_GROUND, State
+from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event_from_message
+from quad_nav.topics.vehicle_states import IN_FLIGHT, ON_GROUND, State, state_from_message
 from quad_vehicles.ros.node import LAND_ALL_TOPIC
 from quad_vehicles.ros.scene_topics import SceneLidars, SceneTopics
 from quad_vehicles.starts import starts_of
@@ -43,10 +45,8 @@ READY_WAIT_S = 90.0
 CALL_WAIT_S = 40.0
 LAND_WAIT_S = 30.0
 LAND_AFTER_S = 1.0
-_TAKEN_OVER = State.TAKEN_OVER.value
-_ON_GROUND = tuple(state.value for state in ON_GROUND)
-_IN_THE_AIR = (*(state.value for state in IN_FLIGHT), _TAKEN_OVER)
-_CAN_FLY = tuple(state.value for state in (State.READY, State.LANDED, State.FLYING, State.HOLDING))
+_IN_THE_AIR = (*IN_FLIGHT, State.TAKEN_OVER)
+_CAN_FLY = (State.READY, State.LANDED, State.FLYING, State.HOLDING)
 SILENT_S = 3.0
 """Bridges publish their states once a second; one that is silent for this long has died."""
 _DEFAULTS: Dict[str, Any] = {
@@ -87,37 +87,41 @@ class VehicleFleet:
         self._robots = len(vehicles)
         self._done: Set[int] = set()
         self._lands_when_done = lands_when_done
-        self._states: Dict[int, Tuple[str, str, float]] = {}  # state, reason, monotonic time
+        self._states: Dict[int, Tuple[State, str, float]] = {}  # state, reason, monotonic time
+        self._warnings = ThrottledWarnings()
         self._lock = threading.Lock()
         self._is_over = False  # the missions of all that fly for them
         self._land_all = rospy.Publisher(LAND_ALL_TOPIC, Empty, queue_size=1)
         self._subscribers = [
             rospy.Subscriber(
-                f"/vehicle{one.number}/state", DiagnosticStatus, self._on_state, one.number
+                f"/vehicle{one.number}/state", VehicleState, self._on_state, one.number
             )
             for one in self._real
         ]
-        self._events = rospy.Subscriber(EVENTS_TOPIC, String, self._on_event, queue_size=100)
+        self._events = rospy.Subscriber(EVENTS_TOPIC, MissionEvent, self._on_event, queue_size=100)
         self._services = [
             rospy.Service("/vehicles/take_off", Trigger, self._take_off),
             rospy.Service("/vehicles/land", Trigger, self._land),
         ]
 
-    def _on_state(self, message: DiagnosticStatus, number: int) -> None:
-        values = {one.key: one.value for one in message.values}
-        state, reason = values.get("state", ""), values.get("reason", "")
-        self._states[number] = state, reason, time.monotonic()
+    def _on_state(self, message: VehicleState, number: int) -> None:
+        try:
+            state = state_from_message(message)
+        except ValueError as error:
+            self._warnings.warn(f"/vehicle{number}/state: message dropped: {error}")
+            return
+        self._states[number] = state, message.reason, time.monotonic()
         self._land_at_end()
 
-    def _on_event(self, message: String) -> None:
-        event = from_text(message.data) or {}
-        robot = event.get("robot")
-        if not isinstance(robot, int) or not 0 <= robot < self._robots:
+    def _on_event(self, message: MissionEvent) -> None:
+        try:
+            event = mission_event_from_message(message, message.header.stamp.to_sec())
+        except ValueError as error:
+            self._warnings.warn(f"{EVENTS_TOPIC}: message dropped: {error}")
             return
-        if event.get("event") != "done":
-            self._done.discard(robot)
-        else:
-            self._done.add(robot)
+        if event.robot >= self._robots:
+            return
+        (self._done.add if event.event is Event.DONE else self._done.discard)(event.robot)
         self._land_at_end()
 
     def _land_at_end(self) -> None:
@@ -134,8 +138,8 @@ class VehicleFleet:
 
     def _is_away(self, robot: int) -> bool:
         """Return whether a pilot has a vehicle, or it stands on the ground, its mission stopped."""
-        is_down = self._is(robot, *_ON_GROUND)
-        return self._is(robot, _TAKEN_OVER) or (is_down and _is_stopped(robot))
+        is_down = self._is(robot, *ON_GROUND)
+        return self._is(robot, State.TAKEN_OVER) or (is_down and _is_stopped(robot))
 
     def _land(self, _: TriggerRequest) -> TriggerResponse:
         """Land all vehicles, and respond when none is in the air, or nothing is known of them."""
@@ -155,7 +159,7 @@ class VehicleFleet:
         """Return whether a vehicle was in the air when its bridge told its state last."""
         return self._is(number, *_IN_THE_AIR)
 
-    def _is(self, number: int, *states: str) -> bool:
+    def _is(self, number: int, *states: State) -> bool:
         """Return whether a vehicle is in one of some states, as its bridge told last."""
         return number in self._states and self._states[number][0] in states
 
@@ -167,7 +171,8 @@ class VehicleFleet:
         """Describe the state of a vehicle; that of a bridge that has died is not known."""
         if number not in self._states:
             return "no bridge"
-        text = ": ".join(filter(None, self._states[number][:2]))
+        state, reason, _ = self._states[number]
+        text = state.value + (f": {reason}" if reason else "")
         return f"its bridge is silent, last state: {text}" if self._is_silent(number) else text
 
     def _take_off(self, _: TriggerRequest) -> TriggerResponse:
@@ -182,7 +187,8 @@ class VehicleFleet:
         if not problems:
             chosen = [one for one in self._real if one.name not in left_out]
             refused = self._call_all("take_off", chosen)
-            for name in [name for name, text in refused.items() if text.startswith(_TAKEN_OVER)]:
+            taken_over = State.TAKEN_OVER.value
+            for name in [one for one, text in refused.items() if text.startswith(taken_over)]:
                 left_out[name] = refused.pop(name)
             problems = _lines(refused) + _ordered(landings)
             if problems:
@@ -209,7 +215,7 @@ class VehicleFleet:
             missing = {}
             for robot, name in names.items():
                 text = self._state(robot)
-                if self._is(robot, _TAKEN_OVER):
+                if self._is(robot, State.TAKEN_OVER):
                     left_out[name] = text
                 elif name not in left_out and (
                     self._is_silent(robot) or not self._is(robot, *_CAN_FLY)

@@ -33,7 +33,15 @@ from quad_vehicles.crazyflie_link import CrazyflieLink
 from quad_vehicles.link import VehicleLink
 from quad_vehicles.mavlink_link import MavlinkLink
 from quad_vehicles.orders import Permissions, Response
-from quad_vehicles.ros.maneuvers import LAND, RESUMPTION, TAKE_OFF, Maneuver, ManeuverAction
+from quad_vehicles.ros.maneuvers import (
+    LAND,
+    LAND_TYPES,
+    RESUMPTION,
+    TAKE_OFF,
+    TAKE_OFF_TYPES,
+    Maneuver,
+    ManeuverAction,
+)
 from quad_vehicles.ros.topics import MissionPause, VehicleTopics, vehicle_health
 from quad_vehicles.safety import COMMAND_HOVER_S
 from quad_vehicles.states import VehicleMachine
@@ -85,8 +93,8 @@ class VehicleNode:
             )
         ]
         self._actions = [
-            ManeuverAction(f"/vehicle{i}/{name}", maneuver, bridge, f"odom{i}", self._warn)
-            for name, maneuver in (("take_off", TAKE_OFF), ("land", LAND))
+            ManeuverAction(f"/vehicle{i}/take_off", TAKE_OFF_TYPES, TAKE_OFF, bridge, self._warn),
+            ManeuverAction(f"/vehicle{i}/land", LAND_TYPES, LAND, bridge, self._warn),
         ]
         publish_health(self._health)
 

@@ -13,7 +13,7 @@ from typing import Dict, List, Optional, Sequence, Tuple
 import numpy as np
 import rospy
 from nav_msgs.msg import OccupancyGrid
-from std_msgs.msg import String
+from quad.msg import FlightInfo as FlightInfoMessage
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
@@ -25,13 +25,14 @@ from quad_nav.ros.common.conversions import (
     scan_message,
 )
 from quad_nav.ros.common.nav_messages import map_message
+from quad_nav.ros.common.own_messages import flight_info_message
 from quad_nav.scenario.scene_map import scene_map
 from quad_nav.sim.casters import kernel_lidars
 from quad_nav.sim.flight import BodyState
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.scene_writer import scene_document
-from quad_nav.topics.flight_info import FLIGHT_TOPIC, to_text
+from quad_nav.topics.flight_info import FLIGHT_TOPIC, FlightInfo
 from quad_nav.topics.markers import number_markers, quadcopter_markers, scene_markers
 from quad_nav.topics.validation import pose_problem
 from quad_nav.versions import versions
@@ -54,8 +55,9 @@ class SceneTopics:
         self._robots.publish(
             marker_array(quadcopter_markers(robots) + number_markers(robots, scene))
         )
-        self._flight = rospy.Publisher(FLIGHT_TOPIC, String, queue_size=1, latch=True)
-        self._flight.publish(to_text({"scene": scene_document(scene), "versions": versions()}))
+        self._flight = rospy.Publisher(FLIGHT_TOPIC, FlightInfoMessage, queue_size=1, latch=True)
+        info = FlightInfo(scene=scene_document(scene), versions=versions())
+        self._flight.publish(flight_info_message(info))
         if map_resolution_m > 0.0:
             self._map = rospy.Publisher("/map", OccupancyGrid, queue_size=1, latch=True)
             self._map.publish(map_message(scene_map(scene, map_resolution_m), rospy.Time.now()))

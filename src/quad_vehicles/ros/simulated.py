@@ -12,24 +12,24 @@ from typing import Dict, Sequence
 
 import numpy as np
 import rospy
-from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import Odometry
+from quad.msg import Contact as ContactMessage
 from tf2_msgs.msg import TFMessage
 
 from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.conversions import (
-    key_values,
     odometry_message,
     time_message,
     transform_message,
 )
+from quad_nav.ros.common.own_messages import contact_message
 from quad_nav.ros.simulator.commands import Commands
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.simulation import Simulation
 from quad_nav.sim.simulation_params import STEPS_PER_S
-from quad_nav.topics.flight_info import CONTACT_STATUS, contact_values
+from quad_nav.topics.contacts import CONTACTS_TOPIC
 from quad_vehicles.ros.scene_topics import PoseListener
 from quad_vehicles.starts import starts_of
 from quad_vehicles.vehicle_file import Vehicle
@@ -76,7 +76,7 @@ class SimulatedVehicles:
         self._poses = PoseListener(len(vehicles))
         self._last: Dict[int, Pose3D] = {}  # poses of the real ones
         self._commands = Commands(self._simulation, self._simulated)
-        self._contacts = rospy.Publisher("/simulation/contacts", DiagnosticStatus, queue_size=100)
+        self._contacts = rospy.Publisher(CONTACTS_TOPIC, ContactMessage, queue_size=100)
         self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
         self._odometry = {
             i: rospy.Publisher(f"/odom{i}", Odometry, queue_size=10) for i in self._simulated
@@ -121,15 +121,7 @@ class SimulatedVehicles:
         if not involved and (contact.other == _FLOOR or not self._counts(contact)):
             return
         rospy.logwarn("%s at (%.2f, %.2f) m", contact, contact.x_m, contact.y_m)
-        self._contacts.publish(
-            DiagnosticStatus(
-                level=DiagnosticStatus.WARN,
-                name=CONTACT_STATUS,
-                hardware_id=contact.robot,
-                message=str(contact),
-                values=key_values(contact_values(contact, rospy.get_time())),
-            )
-        )
+        self._contacts.publish(contact_message(contact, rospy.get_time()))
 
     def _counts(self, contact: Contact) -> bool:
         """Return whether a contact of a real vehicle counts: with another one always."""

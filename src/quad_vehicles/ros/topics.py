@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from dataclasses import replace
 from typing import Callable, Dict, Optional, Tuple
 
 import rospy
-from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import Odometry
+from quad.msg import VehicleState
 from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
@@ -18,7 +20,6 @@ from quad_nav.files.values import is_number
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.ros.common.conversions import (
     ScanMessage,
-    key_values,
     odometry_message,
     scan_message,
     time_message,
@@ -54,9 +55,7 @@ class VehicleTopics:
         self._odom, self._base, self._lidar = f"odom{i}", f"base_link{i}", f"Lidar{i}"
         self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
         self._odometry = rospy.Publisher(f"/odom{i}", Odometry, queue_size=10, tcp_nodelay=True)
-        self._state = rospy.Publisher(
-            f"/vehicle{i}/state", DiagnosticStatus, queue_size=10, latch=True
-        )
+        self._state = rospy.Publisher(f"/vehicle{i}/state", VehicleState, queue_size=10, latch=True)
         self._map_from_odom: Optional[Pose3D] = vehicle.map_from_odom
         self._on_ground: Optional[Pose3D] = None  # the same before the first take-off
         self._scan: Optional[rospy.Publisher] = None
@@ -134,14 +133,16 @@ class VehicleTopics:
 
     def publish_state(self, machine: VehicleMachine) -> None:
         """Publish the state, latched."""
-        health = vehicle_health(self._vehicle, machine)
+        status, battery = machine.inputs.status, machine.inputs.battery
         self._state.publish(
-            DiagnosticStatus(
-                level=int(health.level),
-                name=health.name,
-                message=health.message,
-                hardware_id=health.hardware_id,
-                values=key_values(health.values),
+            VehicleState(
+                header=Header(0, rospy.Time.now(), self._base),
+                state=machine.state.number,
+                reason=machine.reason,
+                mode="" if status is None else status.mode,
+                armed=status is not None and status.is_armed,
+                height=machine.inputs.height_m(machine.ground_m),
+                battery=math.nan if battery is None else battery,
             )
         )
 

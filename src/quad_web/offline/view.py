@@ -12,7 +12,7 @@ import collections
 import time
 from typing import Callable, Deque, List, Optional, Protocol, Tuple
 
-from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
+from quad_nav.mission.actions import Action, GoalEnded
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.pacing import RateMeter
@@ -111,10 +111,9 @@ class WebView(FlightObserver):
 
     def on_action(self, robot: int, now_s: float, action: Action) -> None:
         """Show that a goal was sent or has ended."""
-        is_failure = isinstance(action, GoalEnded) and not action.reached
-        self._items.note_goals(robot, getattr(action, "index", None) if is_failure else None)
-        text, level = _action_text(action)
-        self._note(now_s, text, level, robot)
+        failed = action.index if isinstance(action, GoalEnded) and not action.reached else None
+        self._items.note_goals(robot, failed)
+        self._note(now_s, action.text, action.level.name.lower(), robot)
 
     def on_move(self, flight: Flight) -> None:
         """Carry out what people do, show the flight, and keep its pace."""
@@ -195,21 +194,6 @@ class WebView(FlightObserver):
                 self._look()
         if self.actions.is_paused:
             self._pace = None
-
-
-def _action_text(action: Action) -> Tuple[str, str]:
-    """Return what a sequencer did, and its level."""
-    if isinstance(action, SendGoal):
-        again = (
-            f", attempt {action.attempt}: {action.resend_reason}" if action.resend_reason else ""
-        )
-        pose = action.pose
-        return f"goal {action.index + 1}: sent ({pose.x_m:.2f}, {pose.y_m:.2f}){again}", "info"
-    if isinstance(action, GoalEnded):
-        if action.reached:
-            return f"goal {action.index + 1}: reached after {action.time_s:.1f} s", "info"
-        return f"goal {action.index + 1}: skipped: {action.reason}", "warning"
-    return "all goals have ended", "info"
 
 
 def _end_text(reason: str) -> str:

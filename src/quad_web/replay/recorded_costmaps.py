@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.grid import GridSpec
-from quad_nav.recording.bag_info import LARGEST_M
+from quad_nav.recording.bag_checks import LARGEST_M
 from quad_web.replay.recording_index import RecordingIndex
 
 _KEYFRAME_EVERY = 40  # updates

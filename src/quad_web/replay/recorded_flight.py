@@ -25,7 +25,6 @@ from quad_web.replay.recorded_robot import (
     LOST_AFTER_S,
     RecordedEvent,
     RobotTrack,
-    decision_of,
     events_of,
 )
 from quad_web.replay.recording_index import RecordingIndex
@@ -152,7 +151,7 @@ class RecordedFlight:
         yields = [
             line
             for row, right in enumerate(rights)
-            for line in rows.yield_rows(row, decision_of(right), right.limited_by, self.names)
+            for line in rows.yield_rows(row, right.decision, right.limited_by, self.names)
         ]
         contacts = [one for one in self._trace.contacts if one.time_s <= time_s]
         goals = [
@@ -192,7 +191,7 @@ class RecordedFlight:
         state = rows.robot_state(
             track.state(time_s),
             float(sample[2]),
-            yielding=decision_of(track.right_of_way(time_s)),
+            yielding=track.right_of_way(time_s).decision,
             is_done=is_done,
             is_lost=age_s > LOST_AFTER_S,
         )

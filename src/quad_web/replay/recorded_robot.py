@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.mission.goal import Goal
-from quad_nav.peers.right_of_way import Yield, YieldDecision
 from quad_nav.recording.trace import GoalTrace, RobotTrace
-from quad_nav.topics.right_of_way import LIMITED, MAKES_ROOM, WAITS, RightOfWay
+from quad_nav.topics.right_of_way import RightOfWay
 from quad_web.view import rows
 from quad_web.view.items import TRAIL_POINTS, TRAIL_SPACING_M, UNKNOWN_BODY
 
@@ -166,14 +165,6 @@ def _flown_goals(flown: Sequence[GoalTrace]) -> Tuple[Goal, ...]:
     )
 
 
-def decision_of(right: RightOfWay) -> Optional[YieldDecision]:
-    """Return the decision to yield of a right of way; None if the robot does not yield."""
-    if right.kind not in (WAITS, MAKES_ROOM):
-        return None
-    action = Yield.WAIT if right.kind == WAITS else Yield.MAKE_ROOM
-    return YieldDecision(right.peer, action, right.hold_m and Pose2D(*right.hold_m))
-
-
 def events_of(robots: Sequence[RobotTrace]) -> List[RecordedEvent]:
     """Return what happened to goals, recoveries and peers."""
     events: List[RecordedEvent] = []
@@ -193,6 +184,6 @@ def events_of(robots: Sequence[RobotTrace]) -> List[RecordedEvent]:
         for at_s, name in robot.recoveries:
             events.append(RecordedEvent(at_s, "warning", row, f"recovery {name}"))
         for at_s, right in robot.rights_of_way:
-            if right.kind not in ("", LIMITED):
+            if right.decision is not None:
                 events.append(RecordedEvent(at_s, "info", row, right.text))
     return events

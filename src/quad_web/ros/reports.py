@@ -7,36 +7,25 @@ import threading
 import time
 from typing import Any, Dict, List, Mapping, Optional, Set, Tuple
 
-from diagnostic_msgs.msg import DiagnosticStatus
 from move_base_msgs.msg import RecoveryStatus
+from quad.msg import Contact as ContactMessage
+from quad.msg import FlightInfo, MissionEvent
+from quad.msg import RightOfWay as RightOfWayMessage
 from rosgraph_msgs.msg import Log
-from std_msgs.msg import String, Time
+from std_msgs.msg import Time
 from visualization_msgs.msg import Marker, MarkerArray
 
 from quad_nav.errors import InputError, excerpt
-from quad_nav.files.values import is_number, is_whole
-from quad_nav.geometry import Pose2D, yaw_from_quaternion
-from quad_nav.peers.right_of_way import Yield, YieldDecision
+from quad_nav.geometry import yaw_from_quaternion
+from quad_nav.mission.actions import Event
+from quad_nav.peers.right_of_way import YieldDecision
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
-from quad_nav.sim.scene_file import scene_from_document
-from quad_nav.topics.flight_info import (
-    CONTACT_STATUS,
-    EVENTS_TOPIC,
-    FLIGHT_TOPIC,
-    RESET_TOPIC,
-    contact_from_values,
-    from_text,
-)
-from quad_nav.topics.right_of_way import (
-    LIMITED,
-    MAKES_ROOM,
-    RIGHT_OF_WAY_STATUS,
-    WAITS,
-    RightOfWay,
-    right_of_way_from_values,
-)
+from quad_nav.topics.contacts import CONTACTS_TOPIC, contact_from_message
+from quad_nav.topics.flight_info import FLIGHT_TOPIC, RESET_TOPIC, flight_info_from_message
+from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event_from_message
+from quad_nav.topics.right_of_way import RightOfWay, right_of_way_from_message
 from quad_nav.topics.validation import MAX_MAGNITUDE
 from quad_web.ros.intake import Newest, Topic
 from quad_web.view.state import FleetState
@@ -48,7 +37,6 @@ _ROBOT = re.compile(r"quad(\d{1,4})\b")
 _GOAL = re.compile(r"goal(\d{1,4})(_yaw)?")
 _CONTACT = "CONTACT with"  # the sequencer repeats what the simulator has logged
 _ACTIVE_ALPHA, _REACHED_ALPHA = 0.95, 0.4  # of the spheres of goals, see topics.markers
-_ACTIONS = {WAITS: Yield.WAIT, MAKES_ROOM: Yield.MAKE_ROOM}
 
 
 class FlightReports:
@@ -90,10 +78,10 @@ class FlightReports:
     def topics(self, has_clients: bool) -> Dict[str, Topic]:
         """Return the topics to subscribe to."""
         topics = {
-            FLIGHT_TOPIC: Topic(String, self._on_flight),
-            EVENTS_TOPIC: Topic(String, self._on_event),
+            FLIGHT_TOPIC: Topic(FlightInfo, self._on_flight),
+            EVENTS_TOPIC: Topic(MissionEvent, self._on_event),
             RESET_TOPIC: Topic(Time, self._on_reset),
-            "/simulation/contacts": Topic(DiagnosticStatus, self._on_contact),
+            CONTACTS_TOPIC: Topic(ContactMessage, self._on_contact),
             "/rosout_agg": Topic(Log, self._on_log),
         }
         if not has_clients:
@@ -101,7 +89,7 @@ class FlightReports:
         topics["/goals"] = self._goals.topic
         for robot in range(self._robots):
             node = f"/move_base{robot}"
-            topics[f"{node}/right_of_way"] = Topic(DiagnosticStatus, self._on_right_of_way)
+            topics[f"{node}/right_of_way"] = Topic(RightOfWayMessage, self._on_right_of_way)
             topics[f"{node}/recovery_status"] = Topic(RecoveryStatus, self._on_recovery)
         return topics
 
@@ -111,50 +99,46 @@ class FlightReports:
 
     # -- the flight ----------------------------------------------------------------------
 
-    def _on_flight(self, message: String) -> None:
+    def _on_flight(self, message: FlightInfo) -> None:
         """Merge the facts of a publisher; nothing that comes is trusted."""
-        info = from_text(message.data) or {}
         try:
-            if "scene" in info:
-                document = info["scene"]
-                if isinstance(document, dict) and {"world", "map"} & set(document):
-                    raise InputError(["scene: refers to another file"])
-                self.scene = scene_from_document(document, f"{FLIGHT_TOPIC}: scene")
-        except InputError as error:
-            self._warnings.warn(f"web: {FLIGHT_TOPIC}: scene dropped: {error}", kind="scene")
-        radius_m: Any = info.get("robot_radius_m")
-        if is_number(radius_m) and 0.0 < radius_m <= MAX_MAGNITUDE:
-            self.radius_m = float(radius_m)
-        robots = info.get("robots")
-        for number, robot in enumerate(robots if isinstance(robots, list) else ()):
-            tree = robot.get("parameters") if isinstance(robot, dict) else None
-            if isinstance(tree, dict) and number < self._robots:
-                self.trees[number] = tree
+            info = flight_info_from_message(message)
+            scene = info.read_scene(FLIGHT_TOPIC)
+        except (InputError, ValueError) as error:
+            self._warnings.warn(f"web: {FLIGHT_TOPIC}: message dropped: {error}", kind="flight")
+            return
+        if scene is not None:
+            self.scene = scene
+        if info.robot_radius_m is not None:
+            self.radius_m = info.robot_radius_m
+        for number, robot in enumerate(info.robots[: self._robots]):
+            self.trees[number] = robot.parameters
         self.version += 1
 
     def _on_reset(self, _: Time) -> None:
         self.resets += 1
         self._failed.clear()
 
-    def _on_event(self, message: String) -> None:
-        event = from_text(message.data) or {}
-        robot: Any = event.get("robot")
-        goal: Any = event.get("goal")
-        if is_whole(robot) and is_whole(goal) and 0 <= robot < self._robots and goal < MAX_GOALS:
-            is_failure = event.get("event") == "ended" and event.get("reached") is not True
-            (self._failed.add if is_failure else self._failed.discard)((robot, goal))
-            if event.get("event") == "sent":
-                self.recoveries.pop(robot, None)
-                self.sent_s[robot] = time.monotonic()
-
-    def _on_contact(self, message: DiagnosticStatus) -> None:
-        if message.name != CONTACT_STATUS:
-            return
-        values = {pair.key: pair.value for pair in message.values}
+    def _on_event(self, message: MissionEvent) -> None:
         try:
-            contact = contact_from_values(message.hardware_id, values)
+            event = mission_event_from_message(message, message.header.stamp.to_sec())
         except ValueError as error:
-            self._warnings.warn(f"web: /simulation/contacts: message dropped: {error}", "contact")
+            self._warnings.warn(f"web: {EVENTS_TOPIC}: message dropped: {error}", kind="event")
+            return
+        robot, goal = event.robot, event.goal
+        if event.event is Event.DONE or robot >= self._robots or goal >= MAX_GOALS:
+            return
+        is_failure = event.event is Event.SKIPPED
+        (self._failed.add if is_failure else self._failed.discard)((robot, goal))
+        if event.event is Event.SENT:
+            self.recoveries.pop(robot, None)
+            self.sent_s[robot] = time.monotonic()
+
+    def _on_contact(self, message: ContactMessage) -> None:
+        try:
+            contact = contact_from_message(message, message.header.stamp.to_sec())
+        except ValueError as error:
+            self._warnings.warn(f"web: {CONTACTS_TOPIC}: message dropped: {error}", "contact")
             return
         with self._lock:
             self.contacts = [*self.contacts[1 - MAX_CONTACTS :], contact]
@@ -191,26 +175,19 @@ class FlightReports:
             count = max(0, message.current_recovery_number) + 1
             self.recoveries[robot] = count, max(count, message.total_number_of_recoveries)
 
-    def _on_right_of_way(self, message: DiagnosticStatus) -> None:
+    def _on_right_of_way(self, message: RightOfWayMessage) -> None:
         robot = _robot_of_topic(message)
-        if robot is None or message.name != RIGHT_OF_WAY_STATUS:
+        if robot is None:
             return
         try:
-            self._right_of_way[robot] = right_of_way_from_values(
-                message.message, {pair.key: pair.value for pair in message.values}
-            )
+            self._right_of_way[robot] = right_of_way_from_message(message)
         except ValueError as error:
             topic = f"/move_base{robot}/right_of_way"
             self._warnings.warn(f"web: {topic}: message dropped: {error}", kind="right of way")
 
     def decision(self, robot: int) -> Optional[YieldDecision]:
         """Return a robot's decision to yield, None if it does not yield."""
-        present = self._right_of_way.get(robot, RightOfWay())
-        if present.kind in ("", LIMITED):
-            return None
-        hold_m = present.hold_m
-        point = None if hold_m is None else Pose2D(*hold_m)
-        return YieldDecision(present.peer, _ACTIONS[present.kind], point)
+        return self._right_of_way.get(robot, RightOfWay()).decision
 
     def limited_by(self, robot: int) -> str:
         """Return the name of the robot that limits a robot's command, "" if none does."""

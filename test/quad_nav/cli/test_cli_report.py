@@ -19,21 +19,8 @@ from quad_nav.files.shipped import shipped
 def bag(tmp_path_factory) -> Path:
     """Half a second of the tutorial's mission."""
     path = tmp_path_factory.mktemp("flight") / "good.bag"
-    CliRunner().invoke(
-        main,
-        [
-            "fly",
-            "--quiet",
-            "--time-limit",
-            "0.5",
-            "--beams",
-            "64",
-            "--config",
-            "tutorial",
-            "--record",
-            str(path),
-        ],
-    )
+    words = "fly --quiet --time-limit 0.5 --beams 64 --config tutorial".split()
+    CliRunner().invoke(main, [*words, "--record", str(path)])
     return path
 
 

@@ -21,8 +21,9 @@ from quad_nav.mission.flight_log import Leg
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.summary import MissionSummary, RobotSummary
 from quad_nav.mission.summary_table import table
-from quad_nav.recording.bag_info import checked_flight
+from quad_nav.recording import messages
 from quad_nav.sim.contacts import Contact
+from quad_nav.topics.flight_info import FlightInfo, RobotInfo, flight_info_from_message
 from quad_tune.flight_cache import FlightCache
 
 EVIL = "\x1b]0;owned\x07\x1b[2J\x9b31m\r\x08\x7f\u202ecod\u2066\u200e\nforged: all goals reached"
@@ -217,7 +218,8 @@ def test_messages_of_move_base_in_the_summary():
 
 def test_recorded_flights_are_refused_in_one_line():
     with pytest.raises((InputError, ValueError)) as raised:
-        checked_flight({"robots": [{"parameters": {EVIL: {EVIL: 1}}, "name": 5}], EVIL: 1})
+        robot = RobotInfo(EVIL, parameters={"local_costmap": {"plugins": {EVIL: 1}}})
+        flight_info_from_message(messages.flight_info(FlightInfo(EVIL, robots=(robot,))))
     assert_harmless(printable(raised.value), shown=False)
 
 

@@ -15,7 +15,8 @@ import pytest
 from click.testing import CliRunner
 
 from quad_nav.cli import main
-from quad_nav.recording.bag_info import checked_flight
+from quad_nav.recording import messages
+from quad_nav.topics.flight_info import FlightInfo, RobotInfo, flight_info_from_message
 
 ROOT = Path(__file__).parents[3]
 SOURCES = sorted(
@@ -110,18 +111,12 @@ def test_parameters_in_recordings_load_no_plugins(monkeypatch):
     # They may name Python classes of the author; showing them must not import them.
     named = []
     monkeypatch.setattr("quad_nav.config.plugins.load_class", lambda name, _: named.append(name))
-    checked_flight(
-        {
-            "robots": [
-                {
-                    "parameters": {
-                        "base_global_planner": "antigravity.Planner",
-                        "base_local_planner": "this.Planner",
-                    }
-                }
-            ]
-        }
-    )
+    parameters = {
+        "base_global_planner": "antigravity.Planner",
+        "base_local_planner": "this.Planner",
+    }
+    info = FlightInfo(robots=(RobotInfo("quad0", parameters=parameters),))
+    flight_info_from_message(messages.flight_info(info))
     assert named == []
     assert not {"antigravity", "this"} & set(sys.modules)
 

@@ -9,6 +9,7 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
+from quad_nav.mission.actions import GoalEnded, SendGoal, SequenceDone
 from quad_nav.mission.checkpoint import (
     contact_record,
     head_record,
@@ -19,7 +20,7 @@ from quad_nav.mission.checkpoint import (
 from quad_nav.mission.flight_log import FlightLog
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.goal_file import GoalSequence, SequenceSettings
-from quad_nav.mission.sequencer import Dwell, GoalEnded, SendGoal, SequenceDone, Sequencer
+from quad_nav.mission.sequencer import Dwell, Sequencer
 from quad_nav.sim.contacts import Contact
 
 A, B, C = Goal(3.0, 0.0), Goal(3.0, 4.0), Goal(0.0, 4.0, 1.5)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from quad_nav.geometry import Pose2D, Pose3D
+from quad_nav.mission.actions import SendGoal
 from quad_nav.mission.flight_log import FlightLog, RobotLog
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.goal_file import GoalSequence, SequenceSettings
 from quad_nav.mission.robot_goals import RobotGoals
-from quad_nav.mission.sequencer import SendGoal
 from quad_nav.navigator.tick import Outcome, State, Tick
 from quad_nav.offline.flight_robot import FlightRobot, GoalWatch
 from quad_nav.sim.flight import BodyState

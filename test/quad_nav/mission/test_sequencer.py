@@ -5,17 +5,10 @@ import math
 import pytest
 
 from quad_nav.geometry import Pose2D
+from quad_nav.mission.actions import GoalEnded, SendGoal, SequenceDone
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.goal_file import GoalSequence, SequenceSettings
-from quad_nav.mission.sequencer import (
-    Dwell,
-    GoalEnded,
-    NavigatorReport,
-    SendGoal,
-    SequenceDone,
-    Sequencer,
-    Verdict,
-)
+from quad_nav.mission.sequencer import Dwell, NavigatorReport, Sequencer, Verdict
 
 START = Pose2D(0.0, 0.0, 0.5)
 A, B, C = Goal(3.0, 4.0), Goal(3.0, 8.0), Goal(0.0, 8.0, -1.0)

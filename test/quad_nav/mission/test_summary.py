@@ -2,15 +2,17 @@
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from quad_nav.geometry import Pose2D
+from quad_nav.mission.actions import SendGoal
 from quad_nav.mission.flight_log import FlightLog, Leg, unflown_legs
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.goal_file import GoalSequence
-from quad_nav.mission.sequencer import SendGoal, Sequencer
+from quad_nav.mission.sequencer import Sequencer
 from quad_nav.mission.summary import (
     MissionSummary,
     RobotSummary,
@@ -21,7 +23,7 @@ from quad_nav.mission.summary import (
 )
 from quad_nav.mission.summary_table import table
 from quad_nav.sim.contacts import Contact, ContactLog, Touch
-from quad_nav.topics.flight_info import contact_from_values, contact_values
+from quad_nav.topics.contacts import contact_fields, contact_from_message
 
 # From (0, 0) over (3, 0) to the goal: 7 m where the straight line has 5 m.
 DETOUR = [(0.0, Pose2D(0, 0)), (10.0, Pose2D(3, 0)), (20.0, Pose2D(3, 4))]
@@ -132,9 +134,9 @@ def test_both_shells_count_the_same_contacts(period_s, contacts):
             1.0 + count * period_s, [Touch(0, "pillar", (1.0, 2.0, 1.0))]
         ):
             offline.add_contact(contact)
-            message = contact_values(contact, contact.time_s + 4321.0)
-            ros.add_contact(contact_from_values(contact.robot, message))
-            ros.add_contact(contact_from_values(contact.robot, message))  # sent twice
+            message = SimpleNamespace(**contact_fields(contact))
+            ros.add_contact(contact_from_message(message, contact.time_s + 4321.0))
+            ros.add_contact(contact_from_message(message, contact.time_s + 4321.0))  # sent twice
     assert len(offline.contacts) == len(ros.contacts) == contacts
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import json
+import math
 
 import numpy as np
 import pytest
@@ -12,20 +12,25 @@ from recorded_flight import setup
 from quad_nav.control.controller import Control
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Pose3D, Twist2D, quaternion_from_yaw
+from quad_nav.mission.actions import SendGoal
 from quad_nav.navigator.tick import RecoveryStart, RobotPoses, State, Tick, Trigger
 from quad_nav.offline.flight import FlightObserver
-from quad_nav.recording import messages
+from quad_nav.recording import bag_file, messages
 from quad_nav.recording.bag_trace import read_trace
 from quad_nav.recording.record_file import create
 from quad_nav.recording.recorder import Recorder
 from quad_nav.sim.contacts import Contact
+from quad_nav.topics.contacts import contact_fields
+from quad_nav.topics.flight_info import FlightInfo
 from quad_nav.topics.markers import CYLINDER, Marker
+from quad_nav.topics.mission_events import mission_event
 
-# Stamps are whole nanoseconds; contacts are written with six digits; yaws come from quaternions.
-TIME_S, SIX_DIGITS, YAW_RAD = 1e-9, 1e-5, 1e-12
+# Stamps are whole nanoseconds; yaws come from quaternions.
+TIME_S, YAW_RAD = 1e-9, 1e-12
 
 TOUCH = Contact(0.125, "quad1", "quad0", 9.876543, 2.0)
 HERE = Pose2D(1.5, 1.5)
+EVENT = mission_event(0, 1.0, SendGoal(0, 1, HERE, 1))
 
 
 class Troubles(FlightObserver):
@@ -61,7 +66,7 @@ def traces(tmp_path_factory):
     path = folder / "flight.bag"
     trace, recorder = TraceObserver("short"), Recorder(path, "short")
     summary = fly(setup(folder, seed=3), [trace, Troubles(trace, recorder), recorder])
-    contact = Contact(summary.sim_time_s, "quad1", "quad0", 9.87654, 2.0)
+    contact = Contact(summary.sim_time_s, "quad1", "quad0", 9.876543, 2.0)
     return trace.trace((contact,), summary.reason), read_trace(path)
 
 
@@ -72,7 +77,7 @@ def test_the_information_about_the_flight(traces):
     assert read.seed == 3
     (touch,), (contact,) = seen.contacts, read.contacts
     assert (contact.robot, contact.other) == (touch.robot, touch.other) == ("quad1", "quad0")
-    place = pytest.approx((touch.time_s, touch.x_m, touch.y_m), abs=SIX_DIGITS)
+    place = pytest.approx((touch.time_s, touch.x_m, touch.y_m), abs=TIME_S)
     assert (contact.time_s, contact.x_m, contact.y_m) == place
 
 
@@ -187,8 +192,8 @@ def test_a_paused_simulation_s_odometry_counts_once(tmp_path):
 def test_information_of_several_nodes_is_merged(tmp_path):
     path = bag(
         tmp_path / "flight.bag",
-        ("/quad/flight", 1, messages.text(json.dumps({"seed": 4, "start_s": 1.0}))),
-        ("/quad/flight", 2, messages.text(json.dumps({"robot_radius_m": 0.25}))),
+        ("/quad/flight", 1, messages.flight_info(FlightInfo(seed=4, start_s=1.0))),
+        ("/quad/flight", 2, messages.flight_info(FlightInfo(robot_radius_m=0.25))),
         ("/odom0", 3 * 10**9, odometry(3 * 10**9, 0.0)),
     )
     trace = read_trace(path)
@@ -207,7 +212,7 @@ def test_a_person_who_is_not_in_the_scene_is_refused(tmp_path):
     third = Marker("map", "moving", 2, CYLINDER, (3.0, 3.0, 0.9), (0.5, 0.5, 1.8), (1, 0, 0, 1))
     path = bag(
         tmp_path / "odd.bag",
-        ("/quad/flight", 1, messages.text(json.dumps({"scene": scene}))),
+        ("/quad/flight", 1, messages.flight_info(FlightInfo(scene=scene))),
         ("/odom0", 10**9, odometry(10**9, 0.0)),
         ("/simulation/obstacles", 10**9, messages.marker_array([third])),
     )
@@ -277,13 +282,30 @@ def test_an_incomplete_bag_is_refused_with_its_remedy(tmp_path):
 @pytest.mark.parametrize(
     "topic, content",
     [
-        ("/quad/events", messages.text('{"robot": 0, "event": "sent"}')),
-        ("/simulation/contacts", messages.diagnostic(1, "contact", "", "quad0", {"with": "wall"})),
+        ("/quad/events", messages.stamped("quad/MissionEvent", {**EVENT.fields, "event": 0}, 1)),
+        ("/quad/events", messages.stamped("quad/MissionEvent", {**EVENT.fields, "robot": 100}, 1)),
+        (
+            "/simulation/contacts",
+            messages.stamped("quad/Contact", {**contact_fields(TOUCH), "x": math.nan}, 1),
+        ),
     ],
 )
 def test_an_invalid_message_is_named(tmp_path, topic, content):
     path = bag(tmp_path / "flight.bag", ("/odom0", 1, odometry(1, 0.0)), (topic, 2, content))
     with pytest.raises(InputError, match=f"flight.bag: {topic}: invalid message: .*expected"):
+        read_trace(path)
+
+
+def test_a_recording_of_an_older_version_is_refused(tmp_path):
+    path = bag(tmp_path / "flight.bag", ("/quad/flight", 1, messages.text("{}")))
+    with pytest.raises(InputError, match="/quad/flight: is std_msgs/String, as quad 0.2.0 rec"):
+        read_trace(path)
+
+
+def test_a_message_with_another_definition_is_refused(tmp_path, monkeypatch):
+    path = bag(tmp_path / "flight.bag", ("/quad/flight", 1, messages.flight_info(FlightInfo())))
+    monkeypatch.setattr(bag_file, "definition", lambda kind: ("", "0" * 32))
+    with pytest.raises(InputError, match="quad/FlightInfo has another definition"):
         read_trace(path)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
@@ -11,14 +10,14 @@ from recorded_flight import flown, setup
 
 from quad_nav.costmap.cost_grid import occupancy
 from quad_nav.geometry import Pose2D
+from quad_nav.mission.goal import Goal
 from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly
 from quad_nav.recording import messages
 from quad_nav.recording.bag_file import read_messages
 from quad_nav.recording.messages import path_bytes, plan_bytes, pose_bytes
 from quad_nav.recording.recorder import Recorder
-from quad_nav.sim.scene_file import scene_from_document
-from quad_nav.topics.flight_info import FLIGHT_TOPIC
+from quad_nav.topics.flight_info import FLIGHT_TOPIC, flight_info_from_message
 
 
 class Notes(FlightObserver):
@@ -168,12 +167,12 @@ def test_goals_are_sent_accepted_and_ended_as_by_the_action_server(recorded):
 
 def test_the_flight_is_described_with_its_end(recorded):
     path, _, flight, _ = recorded
-    first, last = [json.loads(one.content.data) for one in read(path, FLIGHT_TOPIC)]
+    first, last = [flight_info_from_message(one.content) for one in read(path, FLIGHT_TOPIC)]
     assert first == last
-    assert (last["title"], last["seed"], last["config"]) == ("short", 0, "default")
-    assert scene_from_document(last["scene"], "it") == flight.trace.scene
-    assert last["robots"][0]["goals"] == [[2.1, 1.9], [2.6, 2.3, 0.5]]
-    assert last["robots"][1]["parameters"] == flight.trace.robots[1].parameters
+    assert (last.title, last.seed, last.config_name) == ("short", 0, "default")
+    assert last.read_scene("it") == flight.trace.scene
+    assert last.robots[0].goals == (Goal(2.1, 1.9), Goal(2.6, 2.3, 0.5))
+    assert last.robots[1].parameters == flight.trace.robots[1].parameters
 
 
 def test_markers_show_every_solid_quadcopter_and_goal(recorded):

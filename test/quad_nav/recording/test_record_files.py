@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import resource
 
 import numpy as np
@@ -51,7 +50,7 @@ def test_an_older_recording_stays_until_the_new_one_is_complete(tmp_path):
     assert path.read_bytes() == b"older"
     flight.end("enough")
     assert len(read(path, "/odom0")) == 2
-    assert json.loads(read(path, FLIGHT_TOPIC)[-1].content.data)["reason"] == "enough"
+    assert read(path, FLIGHT_TOPIC)[-1].content.reason == "enough"
     assert not path.with_name("flight.bag.active").exists()
 
 
@@ -79,7 +78,7 @@ def test_a_flight_that_ends_early_leaves_a_recording(tmp_path, ends, reason):
     with contextlib.suppress(ZeroDivisionError):
         summary = fly(setup(tmp_path), [Recorder(path), ends()])
         assert (ends, summary.reason, summary.success) == (Stop, INTERRUPTED, False)
-    assert json.loads(read(path, FLIGHT_TOPIC)[-1].content.data)["reason"] == reason
+    assert read(path, FLIGHT_TOPIC)[-1].content.reason == reason
 
 
 class SizeLimit:

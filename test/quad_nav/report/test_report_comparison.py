@@ -12,7 +12,7 @@ from hand_made_traces import TIMES_S, fleet, flight, goal, robot
 from report_pages import Parsed, assert_loads_nothing, figures_of
 
 from quad_nav.report.compared_flight import compared_flight, difference_rows, variants
-from quad_nav.report.comparison import comparison_page, write_comparison
+from quad_nav.report.comparison import comparison_page
 from quad_nav.sim.contacts import Contact
 
 SLOW, FAST = {"controller_frequency": 5.0}, {"controller_frequency": 10.0}
@@ -138,11 +138,3 @@ def test_flights_that_hold_little():
     html = comparison_page([compared_flight(empty), compared_flight(fleet(2))]).html
     assert "no value is marked as the best" in html
     assert_loads_nothing(html)
-
-
-def test_files(tmp_path):
-    write_comparison(flights()[:2], tmp_path / "two.html", tmp_path / "paper")
-    names = sorted(path.name for path in (tmp_path / "paper").iterdir())
-    assert names == [
-        f"{name}.{kind}" for name in ("comparison", "paths") for kind in ("png", "svg")
-    ]

@@ -152,17 +152,20 @@ def test_the_sequencer_finds_a_robot_where_its_frame_was_at_the_stamp(ros, stamp
 
 
 @pytest.mark.parametrize("stamp_ns", STAMPS_NS[:4])
-def test_a_cloud_of_obstacles_has_the_stamp_of_their_scan(ros, stamp_ns):
+def test_tracked_obstacles_have_the_stamp_of_their_scan(ros, stamp_ns):
     stamp_s = time_of(stamp_ns).to_sec()
     states, one = np.array([[1.0, 0.0, 1.0, 0.0]]), np.array([1])
     tracks = Tracks(stamp_s, one, states, np.eye(4)[np.newaxis], np.array([0.3]), np.zeros(1))
     filters = SimpleNamespace(tracks=lambda now_s: tracks)
     topics = ObstacleTopics(filters, "map", in_fleet(0))
     topics.publish(stamp_s)
-    (cloud,) = [
-        one.last for name, one in FakePublisher.all.items() if name.endswith("obstacles_cloud")
+    (message,) = [
+        one.last for name, one in FakePublisher.all.items() if name.endswith("obstacle_tracks")
     ]
-    assert cloud.header.stamp == time_of(stamp_ns)
+    assert message.header.stamp == time_of(stamp_ns)
+    assert [(one.number, one.x, one.vx, one.radius) for one in message.obstacles] == [
+        (1, 1.0, 1.0, 0.3)
+    ]
 
 
 @pytest.mark.parametrize("stamp_ns", STAMPS_NS[:4])

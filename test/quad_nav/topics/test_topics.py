@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 
-import numpy as np
 import pytest
 
 from quad_nav.costmap.cost_grid import NO_CELLS, Window
@@ -14,20 +13,10 @@ from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.goal_file import GoalSequence
-from quad_nav.mission.sequencer import GoalEnded, SendGoal, SequenceDone, Sequencer
-from quad_nav.sim.contacts import Contact
+from quad_nav.mission.sequencer import Sequencer
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Scene, Sphere, Walls
 from quad_nav.sim.scene_file import load_scene, scene_from_document
 from quad_nav.sim.scene_writer import scene_document
-from quad_nav.topics.flight_info import (
-    contact_from_values,
-    contact_values,
-    event,
-    from_text,
-    mission_info,
-    simulation_info,
-    to_text,
-)
 from quad_nav.topics.goal_routing import GoalRouter, Route, selection_markers
 from quad_nav.topics.markers import (
     ARROW,
@@ -186,103 +175,6 @@ def test_a_grid_that_moved_is_published_in_full():
 def test_always_send_full_costmap():
     schedule = CostmapSchedule(costmap(publish_frequency_hz=1.0, always_send_full_costmap=True))
     assert [schedule.pop_full_grid(), schedule.pop_full_grid()] == [True, True]
-
-
-# Texts.
-
-
-def test_a_contact_comes_back_from_its_values():
-    contact = Contact(12.3456, "quad0", "quad1", 1.23456, 7.0)
-    values = contact_values(contact, 13.3456)
-    assert contact_from_values("quad0", values) == Contact(13.3456, "quad0", "quad1", 1.23456, 7.0)
-
-
-def test_a_contact_after_days_keeps_its_milliseconds():
-    """Contacts of a pair are told apart by 0.25 s."""
-    contact = Contact(0.0, "quad0", "wall", 1234.56789, 1 / 3)
-    back = contact_from_values("quad0", contact_values(contact, 1234567.125))
-    assert back == Contact(1234567.125, "quad0", "wall", 1234.56789, 1 / 3)
-
-
-@pytest.mark.parametrize(
-    "changed",
-    [
-        {"time_s": "nan"},
-        {"time_s": "-1"},
-        {"time_s": "1e300"},
-        {"x_m": "nan"},
-        {"y_m": "-inf"},
-        {"x_m": "1e300"},
-        {"with": "w" * 201},
-    ],
-)
-def test_a_contact_with_odd_values_is_refused(changed):
-    values = {"with": "wall", "time_s": "1", "x_m": "2", "y_m": "3"}
-    assert contact_from_values("quad0", values) == Contact(1.0, "quad0", "wall", 2.0, 3.0)
-    with pytest.raises(ValueError, match="contact with"):
-        contact_from_values("quad0", {**values, **changed})
-
-
-def test_a_contact_without_a_position_is_refused():
-    with pytest.raises(ValueError, match="has no valid .y_m'"):
-        contact_from_values("quad0", {"with": "wall", "time_s": "1", "x_m": "2"})
-
-
-def test_events_of_the_sequencer():
-    goal = Goal(1.0, 2.0)
-    sent = event(1, 4.5, SendGoal(2, 1, Pose2D(1.0, 2.0, 0.5), 2, "aborted"))
-    assert sent == {
-        "event": "sent",
-        "robot": 1,
-        "time_s": 4.5,
-        "goal": 2,
-        "lap": 1,
-        "x_m": 1.0,
-        "y_m": 2.0,
-        "yaw_rad": 0.5,
-        "attempt": 2,
-        "why": "aborted",
-    }
-    ended = event(0, 9.0, GoalEnded(2, 1, goal, False, 4.5, 2, "aborted"))
-    assert ended == {
-        "event": "ended",
-        "robot": 0,
-        "time_s": 9.0,
-        "goal": 2,
-        "lap": 1,
-        "reached": False,
-        "attempts": 2,
-        "reason": "aborted",
-        "yaw_error_rad": None,
-    }
-    assert event(0, 9.0, SequenceDone())["event"] == "done"
-
-
-def test_flight_info_is_json():
-    info = {
-        **simulation_info(SCENE, 7),
-        **mission_info(
-            {"quad0": GoalSequence((Goal(1.0, 2.0), Goal(1.0, 2.0, 0.5)))},
-            [{"controller_frequency": 10.0}],
-            0.3,
-        ),
-    }
-    read = from_text(to_text(info))
-    assert read == info
-    assert (read["seed"], read["start_s"], read["robot_radius_m"]) == (7, 1.0, 0.3)
-    assert read["robots"] == [
-        {
-            "name": "quad0",
-            "goals": [[1.0, 2.0], [1.0, 2.0, 0.5]],
-            "parameters": {"controller_frequency": 10.0},
-        }
-    ]
-    assert read["versions"]["numpy"] == np.__version__
-
-
-@pytest.mark.parametrize("text", ["", "no JSON", "[1, 2]", '"text"'])
-def test_a_text_without_a_json_object_is_ignored(text):
-    assert from_text(text) is None
 
 
 def test_numbers_stand_beside_the_quadcopters_and_grow_with_the_arena():

@@ -1,4 +1,4 @@
-"""Tracked moving obstacles on topics: markers, the point cloud, when they are published."""
+"""Tracked moving obstacles on topics: markers, numbers, when they are published."""
 
 from __future__ import annotations
 
@@ -12,11 +12,10 @@ from quad_nav.costmap.tracks import Tracks
 from quad_nav.recording.messages import marker_array
 from quad_nav.topics.markers import ARROW, CYLINDER
 from quad_nav.topics.tracked_obstacles import (
-    CLOUD_FIELDS,
     TrackKind,
     TrackSchedule,
-    cloud_rows,
     ellipse,
+    obstacle_fields,
     rows_of_markers,
     track_markers,
     track_rows,
@@ -125,14 +124,12 @@ def test_the_ellipse_is_turned_to_its_larger_axis():
     assert axes == pytest.approx((3.0, 1.0)) and direction_rad == pytest.approx(math.pi / 6)
 
 
-def test_the_cloud_has_states_radii_numbers_and_covariances():
-    rows = cloud_rows(TRACKS)
-    assert rows.shape == (2, 23) and rows.dtype == np.float32
-    first = dict(zip(CLOUD_FIELDS, rows[0].tolist()))
-    expected = {"x": 1.0, "y": 2.0, "z": 0.0, "vx": 0.0, "vy": 1.5, "radius": 0.3, "number": 7.0}
-    assert {name: first[name] for name in expected} == pytest.approx(expected)
-    assert first["cov_x_x"] == pytest.approx(0.04) and first["cov_vy_vy"] == pytest.approx(0.16)
-    assert first["cov_x_y"] == 0.0
+def test_the_messages_have_states_radii_numbers_and_covariances():
+    fields = [dict(one) for one in obstacle_fields(TRACKS)]
+    covariance = fields[0].pop("covariance")
+    assert fields[0] == {"number": 7, "x": 1.0, "y": 2.0, "vx": 0.0, "vy": 1.5, "radius": 0.3}
+    assert covariance.tolist() == COVARIANCE.ravel().tolist()
+    assert [one["number"] for one in fields] == [7, 9]
 
 
 def test_tracks_are_published_at_10_hz_and_once_more_when_they_end():

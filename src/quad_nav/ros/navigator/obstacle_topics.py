@@ -1,21 +1,20 @@
-"""Publish the tracked moving obstacles of a robot: markers for RViz, a point cloud for programs."""
+"""Publish the tracked moving obstacles of a robot: markers for RViz, numbers for programs."""
 
 from __future__ import annotations
 
 import rospy
-from sensor_msgs.msg import PointCloud2, PointField
+from quad.msg import MovingObstacle, MovingObstacles
+from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.costmap.scan_filter import ScanFilters
-from quad_nav.costmap.tracks import Tracks
 from quad_nav.ros.common.conversions import replacing_markers, time_message
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.tracked_obstacles import (
-    CLOUD_FIELDS,
-    CLOUD_TOPIC,
     MARKERS_TOPIC,
+    TRACKS_TOPIC,
     TrackSchedule,
-    cloud_rows,
+    obstacle_fields,
     track_markers,
 )
 
@@ -27,7 +26,7 @@ class ObstacleTopics:
         """Advertise the topics; ``frame`` is that of the tracks."""
         self._filters, self._frame, self._schedule = filters, frame, TrackSchedule()
         self._markers = rospy.Publisher(names(f"~{MARKERS_TOPIC}"), MarkerArray, queue_size=1)
-        self._cloud = rospy.Publisher(names(f"~{CLOUD_TOPIC}"), PointCloud2, queue_size=1)
+        self._obstacles = rospy.Publisher(names(f"~{TRACKS_TOPIC}"), MovingObstacles, queue_size=1)
 
     def restart(self, now_s: float) -> None:
         """Restart the schedule after a clock jump."""
@@ -42,20 +41,7 @@ class ObstacleTopics:
         if self._markers.get_num_connections() > 0:
             shown = track_markers(tracks, frame)
             self._markers.publish(replacing_markers(shown))
-        if self._cloud.get_num_connections() > 0:
+        if self._obstacles.get_num_connections() > 0:
             stamp = time_message(tracks.time_s if len(tracks) else now_s)
-            self._cloud.publish(cloud_message(tracks, frame, stamp))
-
-
-def cloud_message(tracks: Tracks, frame: str, stamp: rospy.Time) -> PointCloud2:
-    """Convert tracks to a cloud with a point for each of them."""
-    rows, size = cloud_rows(tracks), 4 * len(CLOUD_FIELDS)
-    message = PointCloud2(
-        height=1, width=len(rows), point_step=size, row_step=size * len(rows), is_dense=True
-    )
-    message.header.frame_id, message.header.stamp = frame, stamp
-    message.fields = [
-        PointField(name, 4 * k, PointField.FLOAT32, 1) for k, name in enumerate(CLOUD_FIELDS)
-    ]
-    message.data = rows.tobytes()
-    return message
+            obstacles = [MovingObstacle(**fields) for fields in obstacle_fields(tracks)]
+            self._obstacles.publish(MovingObstacles(Header(0, stamp, frame), obstacles))

@@ -6,10 +6,10 @@ from typing import Optional
 
 import numpy as np
 import rospy
-from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Twist
 from move_base_msgs.msg import RecoveryStatus
 from nav_msgs.msg import OccupancyGrid, Path
+from quad.msg import RightOfWay as RightOfWayMessage
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 
@@ -20,15 +20,16 @@ from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import State, Tick
 from quad_nav.plan.global_planner import SearchPlanner
 from quad_nav.plan.navfn import Navfn
-from quad_nav.ros.common.conversions import key_values, time_message, twist_message
+from quad_nav.ros.common.conversions import time_message, twist_message
 from quad_nav.ros.common.nav_messages import (
     cost_cloud_message,
     path_message,
     pose_stamped,
     potential_message,
 )
+from quad_nav.ros.common.own_messages import stamped
 from quad_nav.topics.publishing import Names, own_node
-from quad_nav.topics.right_of_way import RIGHT_OF_WAY_STATUS, RightOfWay, RightOfWaySchedule
+from quad_nav.topics.right_of_way import RightOfWay, RightOfWaySchedule
 
 
 class PlanTopics:
@@ -52,7 +53,7 @@ class PlanTopics:
         self._state = rospy.Publisher(names("~state"), String, queue_size=10, latch=True)
         self._published_state: Optional[State] = None
         self._right_of_way = rospy.Publisher(
-            names("~right_of_way"), DiagnosticStatus, queue_size=10, latch=True
+            names("~right_of_way"), RightOfWayMessage, queue_size=10, latch=True
         )
         self._right_of_way_schedule = RightOfWaySchedule()
         self._recovery = rospy.Publisher(
@@ -73,7 +74,7 @@ class PlanTopics:
         if tick.state is not self._published_state:
             self._published_state = tick.state
             self._state.publish(tick.state.value)
-        self._publish_right_of_way(self._right_of_way_schedule.pop(tick))
+        self._publish_right_of_way(self._right_of_way_schedule.pop(tick), tick.now_s)
         if tick.command is not None:
             self._command.publish(twist_message(tick.command))
         if tick.plan is not None:
@@ -94,17 +95,10 @@ class PlanTopics:
         if tick.control is not None:
             self._publish_control(tick.control, now)
 
-    def _publish_right_of_way(self, changed: Optional[RightOfWay]) -> None:
+    def _publish_right_of_way(self, changed: Optional[RightOfWay], now_s: float) -> None:
         if changed is not None:
-            self._right_of_way.publish(
-                DiagnosticStatus(
-                    level=DiagnosticStatus.OK,
-                    name=RIGHT_OF_WAY_STATUS,
-                    hardware_id=self._robot,
-                    message=changed.text,
-                    values=key_values(changed.values),
-                )
-            )
+            message = stamped(RightOfWayMessage, changed.fields, now_s)
+            self._right_of_way.publish(message)
 
     def publish_plan(self, plan: np.ndarray, now: rospy.Time) -> None:
         """Publish a plan.

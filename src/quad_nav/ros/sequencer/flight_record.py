@@ -11,6 +11,7 @@ from typing import Callable, List, Optional, Sequence
 
 import numpy as np
 
+from quad_nav.mission.actions import Action
 from quad_nav.mission.checkpoint import (
     MissionCheckpoint,
     RobotCheckpoint,
@@ -19,7 +20,7 @@ from quad_nav.mission.checkpoint import (
 )
 from quad_nav.mission.flight_log import FlightLog, Leg
 from quad_nav.mission.progress import SequenceProgress
-from quad_nav.mission.sequencer import Action, NavigatorReport, Sequencer, Verdict
+from quad_nav.mission.sequencer import NavigatorReport, Sequencer, Verdict
 from quad_nav.ros.sequencer.mission_journal import MissionJournal
 from quad_nav.ros.sequencer.odometry import Track
 from quad_nav.sim.contacts import Contact

@@ -14,7 +14,8 @@ from typing import Dict, Iterator, List, Optional, Sequence
 
 import rospy
 from nav_msgs.msg import Odometry
-from std_msgs.msg import String, Time
+from quad.msg import FlightInfo
+from std_msgs.msg import Time
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
@@ -24,6 +25,7 @@ from quad_nav.mission.summary import MissionSummary, summarize
 from quad_nav.ros.common import readiness
 from quad_nav.ros.common.conversions import replacing_markers
 from quad_nav.ros.common.diagnostics import DiagnosticsTopic, ThrottledWarnings
+from quad_nav.ros.common.own_messages import flight_info_message
 from quad_nav.ros.common.readiness import Need
 from quad_nav.ros.common.transforms import TransformUnavailable
 from quad_nav.ros.sequencer.flight_record import FlightRecord
@@ -35,12 +37,7 @@ from quad_nav.ros.sequencer.robot_thread import RobotThread
 from quad_nav.ros.sequencer.simulator_topics import ContactTopic, PeopleTopic
 from quad_nav.ros.sequencer.state_feed import StateFeed
 from quad_nav.scenario.mission_setup import MissionSetup
-from quad_nav.topics.flight_info import (
-    FLIGHT_TOPIC,
-    RESET_TOPIC,
-    mission_info,
-    to_text,
-)
+from quad_nav.topics.flight_info import FLIGHT_TOPIC, RESET_TOPIC, mission_info
 from quad_nav.topics.markers import goal_markers
 from quad_nav.topics.validation import MAX_LEAD_S
 
@@ -98,9 +95,10 @@ class MissionRunner:
         setup = self._setup
         self._goals = rospy.Publisher("/goals", MarkerArray, queue_size=1, latch=True)
         self._diagnostics = DiagnosticsTopic()
-        self._flight = rospy.Publisher(FLIGHT_TOPIC, String, queue_size=1, latch=True)
+        self._flight = rospy.Publisher(FLIGHT_TOPIC, FlightInfo, queue_size=1, latch=True)
         goals = {robot.name: robot.sequence for robot in setup.robots}
-        self._flight.publish(to_text(mission_info(goals, setup.parameters, setup.robot_radius_m)))
+        info = mission_info(goals, setup.parameters, setup.robot_radius_m)
+        self._flight.publish(flight_info_message(info))
         self._publish_goals()
         names = [robot.name for robot in setup.robots]
         self._contacts = ContactTopic(names, self._record, self._warnings)

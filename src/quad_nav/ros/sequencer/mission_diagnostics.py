@@ -1,4 +1,4 @@
-"""Convert the progress of a mission and its contacts to and from `diagnostic_msgs`."""
+"""Convert the progress of a mission to `diagnostic_msgs`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from quad_nav.mission.flight_log import FlightLog
 from quad_nav.ros.sequencer.robot import MissionRobot
-from quad_nav.sim.contacts import Contact
-from quad_nav.topics.flight_info import contact_from_values
 
 
 def progress_message(
@@ -82,12 +80,3 @@ def _state(robot: MissionRobot, distance_m: Optional[float]) -> str:
         left_s = max(dwell.until_s - rospy.get_time(), 0.0)
         return f"staying at goal {sequencer.index} of {count} for {left_s:.0f} s"
     return "done" if sequencer.done else "starting"
-
-
-def contact_from_message(status: DiagnosticStatus) -> Contact:
-    """Read a contact that the simulator has published.
-
-    Raises:
-        ValueError: If a value is missing or not a number.
-    """
-    return contact_from_values(status.hardware_id, {pair.key: pair.value for pair in status.values})

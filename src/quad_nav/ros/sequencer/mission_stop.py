@@ -17,18 +17,19 @@ from typing import Dict, Sequence
 
 import rospy
 from actionlib_msgs.msg import GoalID
-from diagnostic_msgs.msg import DiagnosticStatus
+from quad.msg import VehicleState
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.sequencer.robot import MissionRobot
-from quad_nav.topics.vehicle_states import ON_GROUND, State
+from quad_nav.topics.vehicle_states import ON_GROUND, State, state_from_message
 
 ALL = "/mission"
 STOP_SERVICE, RESUME_SERVICE = f"{ALL}/stop", f"{ALL}/resume"
 STOPPED_PARAMETER = f"{ALL}/stopped"
 LOCK_S = 1.0  # longest wait for a step of a robot that is in progress
 STATES_S = 2.0  # longest wait for the states of the vehicles; a robot without a bridge has none
-_DOWN = tuple(state.value for state in (*ON_GROUND, State.LANDING))
+_DOWN = (*ON_GROUND, State.LANDING)
 
 
 class MissionStop:
@@ -122,9 +123,10 @@ class VehicleStates:
     def __init__(self, robots: int) -> None:
         """Subscribe to the states of some robots."""
         self._robots = robots
-        self._states: Dict[int, str] = {}
+        self._states: Dict[int, State] = {}
+        self._warnings = ThrottledWarnings()
         self._subscribers = [
-            rospy.Subscriber(f"/vehicle{i}/state", DiagnosticStatus, self._on_state, i)
+            rospy.Subscriber(f"/vehicle{i}/state", VehicleState, self._on_state, i)
             for i in range(robots)
         ]
 
@@ -135,8 +137,11 @@ class VehicleStates:
             time.sleep(0.05)
         return [self._states.get(i) in _DOWN for i in range(self._robots)]
 
-    def _on_state(self, message: DiagnosticStatus, robot: int) -> None:
-        self._states[robot] = {one.key: one.value for one in message.values}.get("state", "")
+    def _on_state(self, message: VehicleState, robot: int) -> None:
+        try:
+            self._states[robot] = state_from_message(message)
+        except ValueError as error:
+            self._warnings.warn(f"/vehicle{robot}/state: message dropped: {error}")
 
 
 def _prefix(robot: MissionRobot) -> str:

@@ -10,27 +10,23 @@ import numpy as np
 import rospy
 from move_base_msgs.msg import RecoveryStatus
 from numpy.typing import NDArray
-from std_msgs.msg import String
+from quad.msg import MissionEvent
 
-from quad_nav.errors import InputError
+from quad_nav.errors import InputError, assert_never
 from quad_nav.geometry import Pose2D, Pose3D
+from quad_nav.mission.actions import Action, GoalEnded, SendGoal, SequenceDone
 from quad_nav.mission.flight_log import Leg
 from quad_nav.mission.progress import START, SequenceProgress
 from quad_nav.mission.robot_goals import RobotGoals
-from quad_nav.mission.sequencer import (
-    Action,
-    NavigatorReport,
-    SendGoal,
-    SequenceDone,
-    Sequencer,
-)
+from quad_nav.mission.sequencer import NavigatorReport, Sequencer
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.nav_messages import planar_pose
+from quad_nav.ros.common.own_messages import stamped
 from quad_nav.ros.sequencer.flight_record import FlightRecord
 from quad_nav.ros.sequencer.odometry import OdometryIntake
 from quad_nav.ros.sequencer.robot_link import Inbox, PathPublisher
 from quad_nav.ros.sequencer.state_feed import StateFeed
-from quad_nav.topics.flight_info import EVENTS_TOPIC, event, to_text
+from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event
 
 FILE_POLL_S = 0.5  # wall time, because users edit files while the simulation is paused
 STEPS_PER_S = 100.0  # of all robots together, without anything that a step should not wait with
@@ -78,7 +74,7 @@ class MissionRobot:
         self._next_poll_s = 0.0
         self._index = index
         self._warnings = ThrottledWarnings()
-        self._events = rospy.Publisher(EVENTS_TOPIC, String, queue_size=100)
+        self._events = rospy.Publisher(EVENTS_TOPIC, MissionEvent, queue_size=100)
         self._path = PathPublisher(f"/path{index}")
 
     def begin(self, now_s: float, progress: SequenceProgress = START) -> None:
@@ -229,15 +225,19 @@ class MissionRobot:
     def _do(self, action: Action, leg: Optional[Leg], now_s: float) -> None:
         if isinstance(action, SendGoal) and self.is_stopped:
             return  # stopped during this step; the resumption sends the goal
-        self._events.publish(to_text(event(self._index, now_s, action)))
+        event = mission_event(self._index, now_s, action)
+        self._events.publish(stamped(MissionEvent, event.fields, now_s))
         if isinstance(action, SendGoal):
             self.link.send(action.pose)
             self._log_sent(action)
+        elif isinstance(action, GoalEnded):
+            if leg is not None:
+                self._log_ended(leg)
         elif isinstance(action, SequenceDone):
             self.link.clear()
             rospy.loginfo("%s: all goals flown", self.name)
-        elif leg is not None:
-            self._log_ended(leg)
+        else:
+            assert_never(action)
 
     def _log_sent(self, action: SendGoal) -> None:
         goal = self._goal(action.index, action.lap)

@@ -5,16 +5,15 @@ from __future__ import annotations
 from typing import Collection
 
 import rospy
-from diagnostic_msgs.msg import DiagnosticStatus
+from quad.msg import Contact as ContactMessage
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.sequencer.flight_record import FlightRecord
-from quad_nav.ros.sequencer.mission_diagnostics import contact_from_message
 from quad_nav.scenario.rules import START_S
 from quad_nav.sim.crowd_record import CrowdRecord
 from quad_nav.sim.scene import Scene
-from quad_nav.topics.flight_info import CONTACT_STATUS
+from quad_nav.topics.contacts import CONTACTS_TOPIC, contact_from_message
 from quad_nav.topics.markers import OBSTACLES_TOPIC, people_positions
 from quad_nav.topics.validation import MAX_LEAD_S
 
@@ -33,21 +32,17 @@ class ContactTopic:
             warnings: The node's warnings.
         """
         self._names, self._record, self._warnings = names, record, warnings
-        self._topic = rospy.Subscriber(
-            "/simulation/contacts", DiagnosticStatus, self._add, queue_size=100
-        )
+        self._topic = rospy.Subscriber(CONTACTS_TOPIC, ContactMessage, self._add, queue_size=100)
 
     @property
     def has_publisher(self) -> bool:
         """True while a node publishes contacts."""
         return bool(self._topic.get_num_connections())
 
-    def _add(self, message: DiagnosticStatus) -> None:
-        if message.name != CONTACT_STATUS:
-            return
+    def _add(self, message: ContactMessage) -> None:
         now_s = rospy.get_time()
         try:
-            contact = contact_from_message(message)
+            contact = contact_from_message(message, message.header.stamp.to_sec())
             if contact.time_s > now_s + MAX_LEAD_S:
                 raise ValueError(f"contact at {contact.time_s:.2f} s, /clock is at {now_s:.2f} s")
             if not any(contact.involves(name) for name in self._names):

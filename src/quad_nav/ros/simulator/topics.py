@@ -8,8 +8,10 @@ from typing import List, Sequence
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import OccupancyGrid
+from quad.msg import Contact as ContactMessage
+from quad.msg import FlightInfo
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import String, Time
+from std_msgs.msg import Time
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.ros.common.conversions import (
@@ -21,20 +23,14 @@ from quad_nav.ros.common.conversions import (
 )
 from quad_nav.ros.common.diagnostics import DiagnosticsTopic
 from quad_nav.ros.common.nav_messages import map_message
+from quad_nav.ros.common.own_messages import contact_message, flight_info_message
 from quad_nav.ros.simulator.pose_topics import PoseTopics
 from quad_nav.scenario.scene_map import scene_map
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.simulation import Simulation
 from quad_nav.sim.simulation_params import FASTEST_RATE
-from quad_nav.topics.flight_info import (
-    CONTACT_STATUS,
-    FLIGHT_TOPIC,
-    RESET_TOPIC,
-    contact_values,
-    simulation_info,
-    text_values,
-    to_text,
-)
+from quad_nav.topics.contacts import CONTACTS_TOPIC
+from quad_nav.topics.flight_info import FLIGHT_TOPIC, RESET_TOPIC, simulation_info, text_values
 from quad_nav.topics.markers import (
     OBSTACLES_PERIOD_S,
     OBSTACLES_TOPIC,
@@ -79,7 +75,7 @@ class SimulatorTopics:
         self._poses = PoseTopics(simulation)
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10, latch=True)
         self._scans = {i: rospy.Publisher(f"/scan{i}", ScanMessage, queue_size=10) for i in scanned}
-        self._contacts = rospy.Publisher("/simulation/contacts", DiagnosticStatus, queue_size=100)
+        self._contacts = rospy.Publisher(CONTACTS_TOPIC, ContactMessage, queue_size=100)
         self._reset = rospy.Publisher(RESET_TOPIC, Time, queue_size=1, latch=True)
         self._diagnostics = DiagnosticsTopic()
         self._scene = rospy.Publisher("/simulation/scene", MarkerArray, queue_size=1, latch=True)
@@ -88,9 +84,7 @@ class SimulatorTopics:
         )
         self._obstacles = rospy.Publisher(OBSTACLES_TOPIC, MarkerArray, queue_size=1)
         self._obstacles_s, self._obstacles_listeners = -math.inf, 0  # at the last message
-        self._flight = rospy.Publisher(FLIGHT_TOPIC, String, queue_size=1, latch=True)
-        jitter_m = simulation.params.jitter_m
-        self._flight.publish(to_text(simulation_info(simulation.scene, simulation.seed, jitter_m)))
+        self._publish_flight_info()
         self._scene.publish(marker_array(scene_markers(simulation.scene)))
         count = simulation.n_robots
         self._quadcopters.publish(
@@ -101,6 +95,12 @@ class SimulatorTopics:
             self._map = rospy.Publisher("/map", OccupancyGrid, queue_size=1, latch=True)
             scene = scene_map(simulation.scene, map_resolution_m)
             self._map.publish(map_message(scene, time_message(simulation.now_s)))
+
+    def _publish_flight_info(self) -> None:
+        simulation = self._simulation
+        info = simulation_info(simulation.scene, simulation.seed, simulation.params.jitter_m)
+        self._flight = rospy.Publisher(FLIGHT_TOPIC, FlightInfo, queue_size=1, latch=True)
+        self._flight.publish(flight_info_message(info))
 
     def publish_clock(self) -> None:
         """Publish the simulated time."""
@@ -147,15 +147,7 @@ class SimulatorTopics:
         rospy.logwarn(
             "%s at (%.2f, %.2f) m, time %.2f s", contact, contact.x_m, contact.y_m, contact.time_s
         )
-        self._contacts.publish(
-            DiagnosticStatus(
-                level=DiagnosticStatus.WARN,
-                name=CONTACT_STATUS,
-                hardware_id=contact.robot,
-                message=str(contact),
-                values=key_values(contact_values(contact, contact.time_s)),
-            )
-        )
+        self._contacts.publish(contact_message(contact, contact.time_s))
 
     def publish_health(self, paused: bool, rate: float, factor: float) -> None:
         """Publish the statuses of the clock and of all quadcopters.
