@@ -26,7 +26,6 @@ from typing import Any, Optional
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_moving.params import number, read
 from quad_moving.reachable import (
     BLOCKED,
     Body,
@@ -42,6 +41,7 @@ from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED
 from quad_nav.navigator.command_filter import Command, CommandFilter, Situation, StopReason
+from quad_nav.parameter import number
 
 Floats = NDArray[np.float64]
 
@@ -70,31 +70,17 @@ class EvasionParams:
         "clearance", 0.1, "m", 0, 2, "Distance that the robot keeps from moving obstacles."
     )
     max_speed_mps: float = number(
-        "max_speed",
-        0.0,
-        "m/s",
-        0,
-        10,
-        "Greatest speed of an evasion; the local planner's if that is greater.",
+        "max_speed", 0.0, "m/s", 0, 10, "Greatest speed; the local planner's if that is greater."
     )
     horizon_s: float = number(
-        "horizon",
-        2.0,
-        "s",
-        0,
-        10,
-        "Time for which the robot keeps clear; 0: until it is at rest, where it may be touched.",
+        "horizon", 2.0, "s", 0, 10, "Time for which the robot keeps clear; 0: until it rests."
     )
     max_acceleration_mps2: float = number(
         "max_acceleration", 1.0, "m/s^2", 0, 100, "Greatest acceleration of obstacles."
     )
+    # ISO 13855:2010: people walk at 1.6 m/s.
     max_obstacle_speed_mps: float = number(
-        "max_obstacle_speed",
-        1.6,  # ISO 13855:2010: people walk at 1.6 m/s
-        "m/s",
-        0,
-        10,
-        "Greatest speed of obstacles, unless they are faster already.",
+        "max_obstacle_speed", 1.6, "m/s", 0, 10, "Greatest speed of obstacles, if none is faster."
     )
 
 
@@ -108,6 +94,7 @@ class Evasion(CommandFilter):
     """
 
     acts_when_idle = True
+    params_class = EvasionParams
 
     def __init__(self, params: Parameters) -> None:
         """Evade nothing yet.
@@ -115,7 +102,7 @@ class Evasion(CommandFilter):
         Raises:
             InputError: A parameter is unknown or out of range.
         """
-        self.params = read(EvasionParams, params)
+        self.params = params.read(EvasionParams)
         self.reset()
 
     def reset(self) -> None:

@@ -34,9 +34,9 @@ from quad_moving.earlier_scans import (
     find_arrived,
     find_clusters,
 )
-from quad_moving.params import number
 from quad_nav.costmap.scan_validator import CORRECTION_M, CORRECTION_RAD
 from quad_nav.geometry import Pose3D, Scan, angle_difference
+from quad_nav.parameter import number
 
 Floats = NDArray[np.float64]
 Heights = Tuple[float, float]

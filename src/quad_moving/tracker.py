@@ -27,7 +27,6 @@ from quad_moving.earlier_scans import ENOUGH
 from quad_moving.halted_obstacles import BESIDE_M, PATIENCE_S, SPEED_MPS, HaltedObstacles
 from quad_moving.kalman import Filters
 from quad_moving.moving_points import SLOTS, Heights, MovingPoints, ScanClusters, TrackerParams
-from quad_moving.params import read
 from quad_nav.config.plugins import Parameters
 from quad_nav.costmap.scan_filter import FilteredScan, ScanFilter, ScanSituation
 from quad_nav.costmap.tracks import Tracks
@@ -88,13 +87,15 @@ class Tracker(ScanFilter):
             method ``tracks`` ends those that are too old.
     """
 
+    params_class = TrackerParams
+
     def __init__(self, params: Parameters) -> None:
         """Track nothing yet.
 
         Raises:
             InputError: A parameter is unknown or out of range.
         """
-        self.params = read(TrackerParams, params)
+        self.params = params.read(TrackerParams)
         self._number = 0
         self.reset()
 

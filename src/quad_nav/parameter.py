@@ -21,7 +21,7 @@ import enum
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any, Callable, Optional, Tuple, TypeVar, cast
+from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, TypeVar, cast
 
 _PARAMETER, _UPSTREAM = "parameter", "upstream"  # keys of a field's metadata
 _Params = TypeVar("_Params")
@@ -150,6 +150,18 @@ class Parameter:
         # roscpp rounds a double that is read as an int, halves upwards.
         return float(value) if self.kind == "double" else math.floor(value + 0.5)
 
+    def within_range(self, value: Any) -> Any:
+        """Return the field's value for a ROS value that is within its range.
+
+        Raises:
+            InvalidValue: It is not.
+        """
+        checked = self.check(value)
+        if self.clamp(checked) != checked:
+            ends = f"{self.low} to {self.high}" if self.high is not None else f"{self.low} or more"
+            raise InvalidValue(f"{value} is out of range; expected {ends} {self.unit}".rstrip())
+        return self.field_value(checked)
+
     def clamp(self, value: Any) -> Any:
         """Clamp a value to dynamic_reconfigure's range."""
         if self.kind in ("bool", "str"):
@@ -255,6 +267,26 @@ def parameters_of(owner: type) -> Tuple[Parameter, ...]:
         for name in names
         if _PARAMETER in fields[name].metadata
     )
+
+
+def checked(owner: type, values: Mapping[str, Any]) -> Tuple[Dict[str, Any], List[Tuple[str, str]]]:
+    """Check the values of a plugin's namespace against its declarations.
+
+    Returns:
+        Field -> value of what is right, and (name, fault) of what is unknown or out of its range.
+    """
+    declared = {one.name: one for one in parameters_of(owner)}
+    right: Dict[str, Any] = {}
+    faults: List[Tuple[str, str]] = []
+    for name, value in values.items():
+        if name not in declared:
+            faults.append((name, f"unknown; expected one of {', '.join(declared)}"))
+            continue
+        try:
+            right[declared[name].field] = declared[name].within_range(value)
+        except InvalidValue as fault:
+            faults.append((name, str(fault)))
+    return right, faults
 
 
 def as_upstream(params: _Params) -> _Params:

@@ -43,13 +43,18 @@ def test_the_filters_have_the_parameters_of_their_namespaces():
         (
             "max_speed",
             "fast",
-            "evasion/max_speed: is 'fast'; expected a number of m/s",
+            "evasion/max_speed: 'fast' is not a number; expected a number of m/s",
         ),
-        ("clearance", -1, "evasion/clearance: is -1; expected a number of m from 0 to 2"),
-        ("clearance", True, "evasion/clearance: is True"),
-        ("clearance", float("nan"), "evasion/clearance: is nan"),
+        ("clearance", -1, "evasion/clearance: -1 is out of range; expected a number of m"),
+        ("clearance", 3.0, "evasion/clearance: 3.0 is out of range; expected 0 to 2 m"),
+        ("clearance", True, "evasion/clearance: True is not a number"),
+        ("clearance", float("nan"), "evasion/clearance: nan is not finite"),
     ],
 )
 def test_a_wrong_parameter_is_refused(name, value, problem):
     with pytest.raises(InputError, match=problem):
         Evasion(Parameters({name: value}, "evasion"))
+    tree = robot_tree(RobotSource("people", 0))
+    tree["evasion"] = {name: value}
+    with pytest.raises(InputError, match=problem.partition(": ")[2]):  # before anything flies
+        config.load(tree)

@@ -121,7 +121,7 @@ def test_upstream_is_without_deviations_in_every_part():
 def test_a_declaration_takes_three_lines_at_most():
     kinds = {name for name, value in vars(parameter).items() if not name.startswith("_")}
     long = []
-    for path in Path(parameter.__file__).parent.rglob("*.py"):
+    for path in Path(parameter.__file__).parents[1].rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             call = node.value if isinstance(node, ast.AnnAssign) else None
             if isinstance(call, ast.Call) and getattr(call.func, "id", "") in kinds:

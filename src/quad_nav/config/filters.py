@@ -18,7 +18,9 @@ from quad_nav.config.plugins import (
     Plugin,
     load_class,
 )
-from quad_nav.config.reader import Namespace, check_class, subtree
+from quad_nav.config.reader import Namespace, check_class, named_types, subtree
+from quad_nav.errors import InputError
+from quad_nav.parameter import checked
 
 SCAN_FILTERS, COMMAND_FILTERS = "scan_filters", "command_filters"
 SCAN_VALIDATOR, VORONOI_CELL = "quad/ScanValidator", "quad/VoronoiCell"
@@ -33,28 +35,29 @@ FilterType = Union[str, Plugin]
 
 def normalise_filters(tree: Namespace, notes: Notes) -> None:
     """Check both lists, and that the classes exist; report every fault."""
-    for key in _LISTS:
-        interface, own, _ = _LISTS[key]
-        entries = tree.get(key)
-        if entries is None:
+    for key, (interface, own, _) in _LISTS.items():
+        if tree.get(key) is None:  # a YAML key with nothing below it
+            tree.pop(key, None)
             continue
-        if not isinstance(entries, list):
-            notes.problem(key, f"{entries!r} is not a list; expected a list of {{name: , type: }}")
-            tree[key] = []
-            continue
-        names: List[str] = []
-        for entry in entries:
-            if not _is_entry(entry):
-                notes.problem(key, f"{entry!r} is not a filter; expected {{name: , type: }}")
-            elif entry["name"] in names:
-                notes.problem(key, f"{entry['name']!r} is used twice; expected unique names")
-            else:
-                names.append(entry["name"])
-                subtree(tree, entry["name"], "", notes)
-                if entry["type"] != own:
-                    check_class(
-                        class_name(entry["type"]), interface, join(key, entry["name"]), notes
-                    )
+        listed = named_types(tree[key], key, "a filter", notes)
+        for name, kind in listed.items():
+            subtree(tree, name, "", notes)
+            if kind != own:
+                check_class(class_name(kind), interface, join(key, name), notes)
+                _check_parameters(kind, interface, name, tree[name], notes)
+        tree[key] = [{"name": name, "type": kind} for name, kind in listed.items()]
+
+
+def _check_parameters(
+    kind: str, interface: Interface, name: str, namespace: Namespace, notes: Notes
+) -> None:
+    """Report the faults of parameters that the class of a filter declares."""
+    try:
+        owner = load_class(class_name(kind), interface).params_class
+    except InputError:  # check_class has reported it
+        return
+    for parameter, fault in checked(owner, namespace)[1] if owner is not None else ():
+        notes.problem(join(name, parameter), fault)
 
 
 def filters_of(tree: Mapping[str, Any], key: str) -> Tuple[Tuple[str, FilterType], ...]:
@@ -84,12 +87,6 @@ def filter_names(tree: Mapping[str, Any]) -> List[str]:
     names = list(_LISTS)
     for key in _LISTS:
         entries = tree.get(key)
-        if isinstance(entries, list):
-            names += [entry["name"] for entry in entries if _is_entry(entry)]
+        for entry in entries if isinstance(entries, list) else ():
+            names += [str(entry.get("name"))] if isinstance(entry, dict) else []
     return names
-
-
-def _is_entry(entry: Any) -> bool:
-    return isinstance(entry, dict) and all(
-        isinstance(entry.get(key), str) for key in ("name", "type")
-    )

@@ -57,7 +57,9 @@ def _guarded_class(plugin_class: Any, methods_of: type) -> Any:
             continue
         if isinstance(own, property) and own.fget is not None:
             guarded[name] = property(_guarded(plugin_class, name, own.fget))
-        elif callable(own) and not hasattr(own, "__self__"):  # no method of the class itself
+        elif isinstance(own, type) or hasattr(own, "__self__"):  # of the class, not of objects
+            continue
+        elif callable(own):
             guarded[name] = _guarded(plugin_class, name, own)
     names = {key: getattr(plugin_class, key) for key in ("__module__", "__qualname__", "__doc__")}
     return type(plugin_class.__name__, (plugin_class,), {**guarded, **names})

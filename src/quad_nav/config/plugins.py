@@ -11,7 +11,7 @@ import importlib
 import inspect
 import traceback
 from dataclasses import dataclass, field
-from typing import Any, Dict, Iterator, Mapping, Tuple
+from typing import Any, Dict, Iterator, Mapping, Tuple, Type, TypeVar, cast
 
 from quad_nav.config.plugin_calls import call_constructor
 from quad_nav.control.controller import LocalPlanner
@@ -20,8 +20,11 @@ from quad_nav.costmap.scan_filter import ScanFilter
 from quad_nav.errors import InputError
 from quad_nav.grid import GridSpec
 from quad_nav.navigator.command_filter import CommandFilter
+from quad_nav.parameter import checked
 from quad_nav.plan.planner import GlobalPlanner
 from quad_nav.recovery import Recovery
+
+_Params = TypeVar("_Params")
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,17 @@ class Parameters(Dict[str, Any]):
 
     def __missing__(self, name: str) -> Any:
         raise InputError([f"{self.place}/{name}: missing; expected a value"])
+
+    def read(self, owner: Type[_Params]) -> _Params:
+        """Make a dataclass of the parameters that it declares, see ``quad_nav.parameter``.
+
+        Raises:
+            InputError: One line for each parameter that is unknown or out of its range.
+        """
+        values, faults = checked(cast(type, owner), self)
+        if faults:
+            raise InputError([f"{self.place}/{name}: {fault}" for name, fault in faults])
+        return owner(**values)
 
 
 @dataclass(frozen=True)

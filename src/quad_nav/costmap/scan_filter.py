@@ -62,7 +62,14 @@ class FilteredScan:
 
 
 class ScanFilter:
-    """Base of scan filters. One object has the scans of all sensors of a robot."""
+    """Base of scan filters. One object has the scans of all sensors of a robot.
+
+    Attributes:
+        params_class: Dataclass that declares the parameters, see ``quad_nav.parameter``; None for
+            a filter that checks its parameters itself.
+    """
+
+    params_class: Optional[type] = None
 
     def filter(self, filtered: FilteredScan, situation: ScanSituation) -> FilteredScan:
         """Return a scan with what this filter changes of it; by default nothing."""

@@ -94,9 +94,12 @@ class CommandFilter:
     Attributes:
         acts_when_idle: The filter is asked in each control period of a robot without a goal, too;
             what it is given then is a stop.
+        params_class: Dataclass that declares the parameters, see ``quad_nav.parameter``; None for
+            a filter that checks its parameters itself.
     """
 
     acts_when_idle: bool = False
+    params_class: Optional[type] = None
 
     def filter(self, command: Command, situation: Situation) -> Command:
         """Return the command with what this filter changes of it; by default nothing."""
