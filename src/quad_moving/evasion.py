@@ -42,11 +42,10 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED
 from quad_nav.navigator.command_filter import Command, CommandFilter, Situation, StopReason
 from quad_nav.parameter import number
+from quad_nav.peers.right_of_way import MOVING_OBSTACLE
 
 Floats = NDArray[np.float64]
 
-LIMITED_BY = "moving obstacle"
-"""``Command.limited_by`` of an evasion."""
 BODY = Body(gain_per_s=25.0 / 8.0, acceleration_mps2=2.0, still_mps=0.05)
 """Response of the simulated quadcopter, see ``quad_nav/sim/flight.py``; people count 0.05 m/s as
 rest, see ``bench/walkers.py``."""
@@ -126,7 +125,7 @@ class Evasion(CommandFilter):
         if found is None:
             return self._returning(command, wish)
         self._evades = True
-        return Command(found, StopReason.FILTER if found.is_zero else None, LIMITED_BY)
+        return Command(found, StopReason.FILTER if found.is_zero else None, MOVING_OBSTACLE)
 
     def _wish(self, command: Command, situation: Situation, usual_mps: float) -> Twist2D:
         """Return the command's velocity; of a robot that stands, the one back to its point."""
@@ -142,7 +141,7 @@ class Evasion(CommandFilter):
         return replace(wish, vx_mps=gain_per_s * x_m, vy_mps=gain_per_s * y_m)
 
     def _returning(self, command: Command, wish: Twist2D) -> Command:
-        return command if wish is command.velocity else Command(wish, None, LIMITED_BY)
+        return command if wish is command.velocity else Command(wish, None, MOVING_OBSTACLE)
 
     def _choose(
         self, wish: Twist2D, tracks: Tracks, situation: Situation, usual_mps: float

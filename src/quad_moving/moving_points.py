@@ -42,15 +42,20 @@ Floats = NDArray[np.float64]
 Heights = Tuple[float, float]
 
 SPACING_S, SLOTS, RECENT = 0.4, 40, 5
-"""Earlier scans: the time from one to the next, their number, and how many of them are recent."""
+"""Earlier scans: the time from one to the next, their number, and how many of them are recent.
+
+In 0.4 s a person who walks leaves its place. 16 s are as long as people hide each other in a crowd;
+what has stood for 2 s stands.
+"""
 NOISE_M = 0.02
 """Standard deviation of ranges of common LIDARs, and of the pose of one that flies."""
 LEVEL_M, UPRIGHT_M = 0.3, 0.8
 """Heights above or below a LIDAR's plane, which tilts in flight: in the first its beams speak for
-upright things, in the second they still show where one is that is tracked."""
+upright things, in the second they still show where one is that is tracked. A quadcopter that
+accelerates with 2 m/s^2 tilts by 11 degrees: 0.3 m at 1.5 m, 0.8 m at 4 m."""
 _INCIDENCE_RAD = math.radians(10.0)  # the least that Borges and Aldon take for a surface
-_IDLE_PERIOD_S = 0.1  # where nothing moved, scans that come earlier are left out
-_FULL_TURN_BEAMS = 1.5  # a gap of fewer beams is none
+_IDLE_PERIOD_S = 0.1  # where nothing moved, scans that come earlier are left out: half the time
+_FULL_TURN_BEAMS = 1.5  # drivers count one beam more or less: a gap of fewer beams is none
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ from quad_nav.geometry import Pose3D, Scan
 Floats = NDArray[np.float64]
 
 FIRST_SPEED_MPS = 1.0
-"""Standard deviation of each component of an obstacle's velocity when it is first seen."""
+"""Standard deviation of each component of an obstacle's velocity when it is first seen: a walk."""
 _RESTART_S = 1.5  # time in which a walker is confirmed, or else measured from another start
 _IN_DOUBT_S = 2.0 * PATIENCE_S  # a track may be in space that was never seen: slivers of walls
 _NO_CIRCLES = np.empty((0, 3))

@@ -10,7 +10,6 @@ import pytest
 
 from quad_moving.evasion import (
     BODY,
-    LIMITED_BY,
     Evasion,
     EvasionParams,
     obstacles_of,
@@ -25,6 +24,7 @@ from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL, GridSpec
 from quad_nav.navigator.command_filter import Command, Situation, StopReason
+from quad_nav.peers.right_of_way import MOVING_OBSTACLE
 
 HERE = Pose2D(0.0, 0.0)
 AHEAD = Twist2D(vx_mps=0.5)
@@ -150,7 +150,7 @@ def test_an_obstacle_that_passes_leaves_the_command_as_it_is():
 def test_a_hovering_robot_evades_to_the_nearer_side():
     found = evade(HOVER, tracks([2.0, 0.2, -1.0, 0.0]))
     assert found.velocity.vy_mps < -0.2 and found.stop is None
-    assert found.limited_by == LIMITED_BY
+    assert found.limited_by == MOVING_OBSTACLE
 
 
 def test_commands_are_in_the_robots_frame():

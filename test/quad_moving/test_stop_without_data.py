@@ -88,7 +88,7 @@ def hovers(flight):
 def yields(flight):
     """It flies a manoeuvre to make room; only its goal differs from that of a mission."""
     flight.navigator.peers.is_yield_manoeuvre = True
-    flight.navigator._machine.start_goal(GOAL, 0.0)
+    flight.navigator.start_goal(GOAL, 0.0)
     return State.CONTROLLING
 
 

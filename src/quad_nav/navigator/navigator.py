@@ -40,8 +40,8 @@ from quad_nav.timing import Schedule
 _IDLE_CHECK_HZ = 4.0  # of whether an idle robot is on the path of a peer
 
 
-class Navigator:
-    """Navigator of one robot.
+class Navigator(StateMachine):
+    """Navigator of one robot: its state machine, fed and ticked.
 
     The caller gives observations to the layers of the costmaps; the navigator updates the
     costmaps at their frequency.
@@ -82,25 +82,18 @@ class Navigator:
         self.peers = peers
         self.filters = CommandFilters(filters, params.controller_frequency_hz)
         costmaps = global_costmap, local_costmap
-        self._updates = CostmapUpdates(*costmaps)
-        self._control = ControlSupervisor(controller)
-        self._recovery = RecoverySequence(recoveries, *costmaps)
-        self._machine = StateMachine(
-            params, *costmaps, self._updates, planner, self._control, self._recovery, peers
+        super().__init__(
+            params,
+            *costmaps,
+            CostmapUpdates(*costmaps),
+            planner,
+            ControlSupervisor(controller),
+            RecoverySequence(recoveries, *costmaps),
+            peers,
         )
         self._idle_check = Schedule(_IDLE_CHECK_HZ)
         self._started = False
         self._stop_wanted = False
-
-    @property
-    def params(self) -> NavigatorParams:
-        """The parameters."""
-        return self._machine.params
-
-    @property
-    def planner(self) -> GlobalPlanner:
-        """The global planner."""
-        return self._machine.planner
 
     @property
     def recoveries(self) -> Tuple[NamedRecovery, ...]:
@@ -112,25 +105,15 @@ class Navigator:
         """Number of recovery behaviours that have run for what fails now."""
         return self._recovery.done
 
-    @property
-    def state(self) -> State:
-        """State of the state machine."""
-        return self._machine.state
-
-    @property
-    def goal(self) -> Optional[Pose2D]:
-        """Goal pose in the global costmap's frame, None if the robot is idle."""
-        return self._machine.goal
-
     # -- changes in flight ---------------------------------------------------------------
 
     def set_params(self, params: NavigatorParams) -> None:
         """Change the parameters."""
-        self._machine.params = params
+        self.params = params
 
     def set_planner(self, planner: GlobalPlanner) -> None:
         """Replace the global planner; the plan in flight stays."""
-        self._machine.planner = planner
+        self.planner = planner
 
     def set_controller_params(self, params: Any) -> None:
         """Change the local planner's parameters; limits of recoveries stay in force."""
@@ -143,18 +126,18 @@ class Navigator:
 
         As in move_base, an active goal is replaced or cancelled at the next control cycle only.
         """
-        return self.state is State.IDLE or self._machine.is_cycle_due(now_s)
+        return self.state is State.IDLE or self.is_cycle_due(now_s)
 
     def set_goal(self, goal: Pose2D, now_s: float) -> None:
         """Head for a pose in the global costmap's frame, from this cycle on."""
         self.peers.start_goal(goal, now_s)
         self._stop_wanted = False
-        self._machine.start_goal(goal, now_s)
+        self.start_goal(goal, now_s)
 
     def cancel(self) -> None:
         """Drop the goal; the next tick publishes a stop."""
         self._stop_wanted = self.state is not State.IDLE
-        self._machine.end_goal()
+        self.end_goal()
 
     # -- time ----------------------------------------------------------------------------
 
@@ -166,7 +149,7 @@ class Navigator:
         due_s = math.inf if self._costmaps_rest else self._updates.due_s
         due_s = min(due_s, self._control.limiter.due_s)
         if self.state is not State.IDLE:
-            return min(due_s, self._machine.due_s)
+            return min(due_s, self.due_s)
         due_s = min(due_s, self.filters.idle_due_s)
         return min(due_s, self._idle_check.due_s) if self.peers.params.avoid_peers else due_s
 
@@ -178,7 +161,7 @@ class Navigator:
     def restart(self, now_s: float) -> None:
         """Restart schedules, patience and costmaps after the clock has jumped back."""
         goal = None if self.peers.is_yield_manoeuvre else self.goal
-        self._machine.end_goal()
+        self.end_goal()
         self._start_idle_checks(now_s)
         self.peers.restart()
         self._updates.start(now_s)
@@ -235,7 +218,7 @@ class Navigator:
         if self.state is State.IDLE and self._idle_check.pop(tick.now_s):
             self._make_room_when_idle(tick, poses.in_global)
         if self.state is not State.IDLE:
-            self._machine.run(tick, poses, velocity)
+            self.run(tick, poses, velocity)
 
     def _filter(
         self, tick: Tick, poses: RobotPoses, velocity: Twist2D, tracks: Optional[Tracks]
@@ -247,7 +230,7 @@ class Navigator:
             return
         given = None if tick.command is None else Command(tick.command, tick.stop)
         if given is None:
-            if not is_idle_cycle or self._machine.missing_data(tick.now_s, poses):
+            if not is_idle_cycle or self.missing_data(tick.now_s, poses):
                 return
         command = self.filters.filter(given, self._situation(tick, poses, velocity, tracks))
         if command is None:
@@ -255,7 +238,7 @@ class Navigator:
         tick.command, tick.stop = command.velocity, command.stop
         tick.limited_by = command.limited_by
         if tick.limited_by:
-            self._machine.hold_back(tick, poses.in_global)
+            self.hold_back(tick, poses.in_global)
 
     def _situation(
         self, tick: Tick, poses: RobotPoses, velocity: Twist2D, tracks: Optional[Tracks]
@@ -287,11 +270,11 @@ class Navigator:
         if command.is_zero or (tick.command is None and self.state is not State.IDLE):
             return  # it stands, or the next control cycle stops it
         recovers = tick.command is not None and tick.command is proposed
-        if recovers and not self._machine.stops_without_data:
+        if recovers and not self.stops_without_data:
             return  # a recovery goes on, as upstream
-        missing = self._machine.missing_data(tick.now_s, poses)
+        missing = self.missing_data(tick.now_s, poses)
         if missing:
-            self._machine.stop_without_data(tick, missing)
+            self.stop_without_data(tick, missing)
 
     def _start_idle_checks(self, now_s: float) -> None:
         self._idle_check.start(now_s)
@@ -311,7 +294,7 @@ class Navigator:
         advice = self.peers.decide(tick.now_s, pose, None)
         tick.notes += advice.messages
         if advice.manoeuvre_goal is not None:
-            self._machine.start_goal(advice.manoeuvre_goal, tick.now_s)
+            self.start_goal(advice.manoeuvre_goal, tick.now_s)
 
     # -- costmaps ------------------------------------------------------------------------
 
