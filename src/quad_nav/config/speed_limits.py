@@ -6,59 +6,17 @@ all speeds of the chosen local planner, those of flying backwards included.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Dict, Mapping, Optional, Tuple
+from typing import Any, Dict, Mapping, Tuple
 
 from quad_nav.config.notes import CAUTION, Notes, join
-from quad_nav.config.planners import DWA_PLANNER
+from quad_nav.config.planners import LOCAL_PLANNERS
 from quad_nav.config.plugins import plugin_name
 from quad_nav.config.reader import made
-from quad_nav.control.dwa_planner_params import DwaParams
-from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.files.values import nearest
-from quad_nav.navigator.params import DEFAULT_LOCAL_PLANNER
-from quad_nav.parameter import parameters_of
 from quad_nav.recovery import MoveSlowAndClearParams
 
-
-@dataclass(frozen=True)
-class Speeds:
-    """Parameters of a local planner that limit its speeds."""
-
-    owner: type
-    translation: Tuple[str, ...]
-    rotation: Tuple[str, ...]
-
-    @property
-    def fields(self) -> Dict[str, str]:
-        """Return parameter -> field of every speed."""
-        return {
-            parameter.name: parameter.field
-            for parameter in parameters_of(self.owner)
-            if parameter.unit in ("m/s", "rad/s") and parameter.kind == "double"
-        }
-
-
-# Plugins are not in it: they have no reconfigurable parameters.
-SPEEDS: Dict[str, Speeds] = {
-    DEFAULT_LOCAL_PLANNER: Speeds(
-        TrajectoryPlannerParams,
-        translation=("max_vel_x", "min_vel_x", "escape_vel"),
-        rotation=("max_vel_theta", "min_vel_theta", "min_in_place_vel_theta", "max_rotational_vel"),
-    ),
-    DWA_PLANNER: Speeds(
-        DwaParams,
-        translation=(
-            "max_vel_trans",
-            "min_vel_trans",
-            "max_vel_x",
-            "min_vel_x",
-            "max_vel_y",
-            "min_vel_y",
-        ),
-        rotation=("max_vel_theta", "min_vel_theta"),
-    ),
-}
+# Speeds that tell when the robot has stopped, or when its footprint grows: they limit nothing.
+_NO_LIMIT = ("_stopped_", "scaling_speed")
 _UPSTREAM_NAMESPACE = "DWAPlannerROS"
 # Parameters that name one more speed, and their upstream defaults.
 _NAMES = {"max_trans_param_name": "max_trans_vel", "max_rot_param_name": "max_rot_vel"}
@@ -66,8 +24,8 @@ _NAMES = {"max_trans_param_name": "max_trans_vel", "max_rot_param_name": "max_ro
 
 def check_slow(namespace: Mapping[str, Any], name: str, planner: str, notes: Notes) -> None:
     """Add remarks on names that are not of ``planner``, the chosen local planner."""
-    own, speeds = plugin_name(planner), SPEEDS.get(planner)
-    if speeds is None:
+    own, speeds = plugin_name(planner), _speeds(planner)
+    if not speeds:
         notes.remark(name, CAUTION, f"{own} is not limited: plugins have no reconfigurable speeds")
         return
     given = namespace.get("planner_namespace", "")
@@ -80,36 +38,50 @@ def check_slow(namespace: Mapping[str, Any], name: str, planner: str, notes: Not
         return
     for key, original in _NAMES.items():
         speed = namespace.get(key, "")
-        if isinstance(speed, str) and speed not in ("", original, *speeds.fields):
+        if isinstance(speed, str) and speed not in ("", original, *speeds):
             notes.remark(
                 join(name, key),
                 CAUTION,
                 f"{own} has no speed parameter {speed}",
-                nearest(speed, speeds.fields),
+                nearest(speed, speeds),
             )
+
+
+def _speeds(planner: str, *units: str) -> Dict[str, str]:
+    """Return parameter -> field of every speed of a local planner; none of a plugin."""
+    if planner not in LOCAL_PLANNERS:
+        return {}
+    return {
+        parameter.name: parameter.field
+        for parameter in LOCAL_PLANNERS[planner].table.parameters
+        if parameter.kind == "double" and parameter.unit in (units or ("m/s", "rad/s"))
+    }
 
 
 def slow_params(namespace: Mapping[str, Any], planner: str) -> MoveSlowAndClearParams:
     """Make the recovery's dataclass from a normalised namespace."""
-    speeds: Optional[Speeds] = SPEEDS.get(planner)
+    speeds = _speeds(planner)
 
-    def limited(names: Tuple[str, ...], key: str) -> Tuple[str, ...]:
-        known = speeds.fields if speeds else {}
-        return tuple(
-            dict.fromkeys(known[name] for name in (*names, namespace.get(key, "")) if name in known)
-        )
+    def limited(unit: str, key: str) -> Tuple[str, ...]:
+        limits = [
+            field
+            for name, field in _speeds(planner, unit).items()
+            if not any(word in name for word in _NO_LIMIT)
+        ]
+        extra = [speeds[name] for name in (namespace.get(key, ""),) if name in speeds]
+        return tuple(dict.fromkeys([*limits, *extra]))
 
     def named(key: str) -> str:
         given = namespace.get("planner_namespace", "") or _UPSTREAM_NAMESPACE
-        if speeds is None or given.strip("/") != plugin_name(planner):
+        if not speeds or given.strip("/") != plugin_name(planner):
             return ""  # upstream calls the dynamic_reconfigure server of another planner
-        return speeds.fields.get(namespace.get(key, "") or _NAMES[key], "")
+        return speeds.get(namespace.get(key, "") or _NAMES[key], "")
 
     return made(
         MoveSlowAndClearParams,
         namespace,
         named_translation_field=named("max_trans_param_name"),
         named_rotation_field=named("max_rot_param_name"),
-        translation_fields=limited(speeds.translation if speeds else (), "max_trans_param_name"),
-        rotation_fields=limited(speeds.rotation if speeds else (), "max_rot_param_name"),
+        translation_fields=limited("m/s", "max_trans_param_name"),
+        rotation_fields=limited("rad/s", "max_rot_param_name"),
     )
