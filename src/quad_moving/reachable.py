@@ -10,8 +10,9 @@ import math
 from typing import NamedTuple, Tuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from quad_nav.files.kernel_cache import njit
 
 BLOCKED = -np.inf
 """Result for a command after which the robot cannot stop before what stands."""
