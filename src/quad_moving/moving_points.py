@@ -131,6 +131,25 @@ class ScanClusters:
         return bool((view.ranges[beams] > distance_m + behind_m).all())
 
 
+@dataclass(frozen=True)
+class TrackedScan:
+    """What a scan shows of moving obstacles.
+
+    Attributes:
+        moving_beams: bool[n], beams that hit confirmed tracks.
+        vacated: float64[k, 3], points in the fixed frame, seen before, of obstacles whose tracks
+            this scan confirms: they have moved on.
+    """
+
+    moving_beams: NDArray[np.bool_]
+    vacated: Floats
+
+    @property
+    def any_moving(self) -> bool:
+        """True if the scan shows a confirmed track."""
+        return bool(self.moving_beams.any())
+
+
 class MovingPoints:
     """Compare the scans of one LIDAR with its earlier ones."""
 

@@ -26,7 +26,14 @@ from quad_moving.discs import Outlines, Radius, fit, outlines
 from quad_moving.earlier_scans import ENOUGH
 from quad_moving.halted_obstacles import BESIDE_M, PATIENCE_S, SPEED_MPS, HaltedObstacles
 from quad_moving.kalman import Filters
-from quad_moving.moving_points import SLOTS, Heights, MovingPoints, ScanClusters, TrackerParams
+from quad_moving.moving_points import (
+    SLOTS,
+    Heights,
+    MovingPoints,
+    ScanClusters,
+    TrackedScan,
+    TrackerParams,
+)
 from quad_nav.config.plugins import Parameters
 from quad_nav.costmap.scan_filter import FilteredScan, ScanFilter, ScanSituation
 from quad_nav.costmap.tracks import Tracks
@@ -57,25 +64,6 @@ class _Life:
     hits: int = 1
     is_confirmed: bool = False
     trail: List[Floats] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class TrackedScan:
-    """What a scan shows of moving obstacles.
-
-    Attributes:
-        moving_beams: bool[n], beams that hit confirmed tracks.
-        vacated: float64[k, 3], points in the fixed frame, seen before, of obstacles whose tracks
-            this scan confirms: they have moved on.
-    """
-
-    moving_beams: NDArray[np.bool_]
-    vacated: Floats
-
-    @property
-    def any_moving(self) -> bool:
-        """True if the scan shows a confirmed track."""
-        return bool(self.moving_beams.any())
 
 
 class Tracker(ScanFilter):
