@@ -18,6 +18,8 @@ from quad_moving.kalman_kernel import predict_states, update_state
 
 Floats = NDArray[np.float64]
 
+FIRST_SPEED_MPS = 1.0
+"""Standard deviation of each component of a velocity before it is known: a walk."""
 _MEMORY = 0.7  # weight of the innovations before, in the mean: of the last three scans
 _LARGE, _EXPECTED = 4.6, 2.0  # of a chi-square with 2 degrees of freedom: 10 %, mean
 _UP, _DOWN, _HIGHEST = 1.5, 0.85, 5.0  # who turns back in 0.3 s needs 5 times 1.5 m/s^2
@@ -41,17 +43,16 @@ class Filters:
     def __len__(self) -> int:
         return len(self.states)
 
-    def add(self, position: Floats, noise: Floats, speed_mps: float) -> None:
+    def add(self, position: Floats, noise: Floats) -> None:
         """Begin a filter with one measurement.
 
         Args:
             position: float64[2], metres.
             noise: float64[2, 2], covariance of the position.
-            speed_mps: Standard deviation of each component of the velocity.
         """
         covariance = np.zeros((1, 4, 4))
         covariance[0, :2, :2] = noise
-        covariance[0, 2, 2] = covariance[0, 3, 3] = speed_mps**2
+        covariance[0, 2, 2] = covariance[0, 3, 3] = FIRST_SPEED_MPS**2
         self.states = np.concatenate([self.states, [[position[0], position[1], 0.0, 0.0]]])
         self.covariances = np.concatenate([self.covariances, covariance])
         self._levels = np.append(self._levels, 1.0)

@@ -41,12 +41,9 @@ from quad_nav.geometry import Pose3D, Scan
 
 Floats = NDArray[np.float64]
 
-FIRST_SPEED_MPS = 1.0
-"""Standard deviation of each component of an obstacle's velocity when it is first seen: a walk."""
 _RESTART_S = 1.5  # time in which a walker is confirmed, or else measured from another start
 _IN_DOUBT_S = 2.0 * PATIENCE_S  # a track may be in space that was never seen: slivers of walls
-_NO_CIRCLES = np.empty((0, 3))
-_NO_POINTS = np.empty((0, 3))
+_NONE = np.empty((0, 3))
 
 
 @dataclass
@@ -139,7 +136,7 @@ class Tracker(ScanFilter):
         scan: Scan,
         frame_from_sensor: Pose3D,
         heights_m: Heights = (-math.inf, math.inf),
-        known_circles: Floats = _NO_CIRCLES,
+        known_circles: Floats = _NONE,
     ) -> Optional[TrackedScan]:
         """Take a scan.
 
@@ -352,7 +349,7 @@ class Tracker(ScanFilter):
             )
             self._remember(life, clusters, row)
             self._lives.append(life)
-            self._filters.add(disc.position, disc.noise, FIRST_SPEED_MPS)
+            self._filters.add(disc.position, disc.noise)
 
     def _is_covered(self, centre: Floats) -> bool:
         """Return whether a place is in the disc of a track, float64[2]."""
@@ -375,7 +372,7 @@ class Tracker(ScanFilter):
                 away_m = np.hypot(*(seen.centres - state[:2]).T)
                 rows |= may_move & (away_m < life.radius.outer_m + BESIDE_M)
         beams = np.append(rows, False)[clusters.labels]  # label -1 takes the last one
-        return TrackedScan(beams, np.concatenate(vacated) if vacated else _NO_POINTS)
+        return TrackedScan(beams, np.concatenate(vacated) if vacated else _NONE)
 
     def _has_moved(self, state: Floats, covariance: Floats, life: _Life) -> bool:
         """Return whether a track has moved by more than its uncertainty, and is fast enough."""
