@@ -43,16 +43,17 @@ class Filters:
     def __len__(self) -> int:
         return len(self.states)
 
-    def add(self, position: Floats, noise: Floats) -> None:
+    def add(self, position: Floats, noise: Floats, speed_mps: float = FIRST_SPEED_MPS) -> None:
         """Begin a filter with one measurement.
 
         Args:
             position: float64[2], metres.
             noise: float64[2, 2], covariance of the position.
+            speed_mps: Standard deviation of each component of the velocity.
         """
         covariance = np.zeros((1, 4, 4))
         covariance[0, :2, :2] = noise
-        covariance[0, 2, 2] = covariance[0, 3, 3] = FIRST_SPEED_MPS**2
+        covariance[0, 2, 2] = covariance[0, 3, 3] = speed_mps**2
         self.states = np.concatenate([self.states, [[position[0], position[1], 0.0, 0.0]]])
         self.covariances = np.concatenate([self.covariances, covariance])
         self._levels = np.append(self._levels, 1.0)
