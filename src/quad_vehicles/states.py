@@ -92,16 +92,14 @@ class VehicleMachine:
         return Response(True, "taking off")
 
     def _take_off_problem(self, now_s: float) -> str:
-        reasons = self.inputs.not_ready(now_s)
-        if reasons:
-            return "; ".join(reasons)
-        status = self.inputs.status
+        return "; ".join(self.inputs.not_ready(now_s)) or self._permission_problem()
+
+    def _permission_problem(self) -> str:
+        status, permissions = self.inputs.status, self._permissions
         is_armed = status is not None and status.is_armed
-        if self.traits.needs_arming and not (
-            is_armed or self._permissions.may_arm or self._permissions.is_dry
-        ):
-            return "the motors are not armed: arm by hand, or start with arm:=true"
-        return ""
+        if is_armed or permissions.may_arm or permissions.is_dry or not self.traits.needs_arming:
+            return ""
+        return "the motors are not armed: arm by hand, or start with arm:=true"
 
     def land(self, now_s: float, reason: str, is_stop_all: bool = False) -> Response:
         """Ask for a landing; with ``is_stop_all`` not against the mode that a pilot has set."""
@@ -249,6 +247,7 @@ class VehicleMachine:
         streams, age_s = self.traits.streams_before_control, now_s - self._order_s
         arms = self._order is Order.ARM
         problem = safety.arming_problem(status, self._is_confirmed, age_s) if arms else ""
+        problem = problem or self._permission_problem()  # the pilot may have disarmed meanwhile
         if problem:
             self._give_up(problem, now_s)
         elif not status.is_controlled:

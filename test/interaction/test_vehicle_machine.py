@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import NamedTuple
 
 import pytest
 
@@ -18,6 +17,7 @@ from hypothesis.stateful import (  # noqa: E402
     invariant,
     rule,
 )
+from interaction.known_vehicles import Known, Request  # noqa: E402
 from interaction.machines import assert_sound, machine_settings  # noqa: E402
 from interaction.vehicle_world import EPOCH_S, STEP_S, VEHICLES, VehicleWorld  # noqa: E402
 
@@ -47,6 +47,8 @@ OF_ONE = ("/vehicle{}/take_off", "/vehicle{}/land", "/vehicle{}/resume")
 OF_ONE += ("/mission/quad{}/stop", "/mission/quad{}/resume")
 OF_ALL = ("/vehicles/take_off", "/vehicles/land", "/mission/stop", "/mission/resume")
 ARM, TAKE_OFF = 400, 22
+ON_GROUND_S, IN_FLIGHT_S = 1.5, 12.0
+"""Where both vehicles are so long after the begin."""
 COMMAND_S = 0.5 + 3.0 * STEP_S
 """A velocity command counts for so long; its set-point is sent again meanwhile."""
 TOLD_S = 1.3
@@ -59,50 +61,6 @@ FAILSAFE_S = 8.0
 """The autopilot does not wait longer for a bridge that is dead."""
 STAMP_S, STEPPED_S = 0.3, 3.0
 """Odometry is not older, so soon after a step of a clock."""
-
-
-class Known:
-    """What a person knows of a vehicle.
-
-    Attributes:
-        may_take_off: Somebody, or the begin of the mission, has asked for a take-off.
-        is_armed: At the last step.
-        disarmed_s: When its motors have stopped last.
-        taken_s: Since when its pilot has it, or it hovers since its bridge has died; else None.
-        is_stopped: Its mission is stopped, or must be.
-        changed_s: When its bridge, its link or the mission has changed last.
-        poor_s: Since when its battery is low or its position lost; None if neither.
-        stepped_s: When a clock has stepped last.
-    """
-
-    def __init__(self, now_s):
-        self.may_take_off, self.is_armed, self.is_stopped = True, False, False
-        self.taken_s = self.poor_s = None
-        self.changed_s = self.stepped_s = self.disarmed_s = now_s
-
-
-class Request(NamedTuple):
-    """Somebody has called a service of the vehicles, and waits for its response.
-
-    Attributes:
-        service: Its name.
-        asked_s: When it was called.
-        before: Numbers of the vehicles that it asks, and whether each might take off before.
-        responses: Takes the response; None if the node has died.
-    """
-
-    service: str
-    asked_s: float
-    before: dict
-    responses: list
-
-    @property
-    def takes_off(self):
-        return self.service.endswith("take_off")
-
-    @property
-    def takes_control(self):
-        return not self.service.endswith("land")
 
 
 @lru_cache(maxsize=None)
@@ -126,15 +84,18 @@ class VehicleMachine(RuleBasedStateMachine):
         is_alone: Whether nothing has happened yet that concerns vehicle 1, too.
     """
 
-    @initialize(autopilot=st.sampled_from(["ardupilot", "px4"]))
-    def begin(self, autopilot):
+    @initialize(
+        autopilot=st.sampled_from(["ardupilot", "px4"]),
+        seconds=st.sampled_from([ON_GROUND_S, IN_FLIGHT_S]),
+    )
+    def begin(self, autopilot, seconds):
         self.autopilot, self.is_alone = autopilot, True
         self.requests, self.faults = [], []
         undisturbed(autopilot)
         self.world = VehicleWorld(autopilot)
         self.known = [Known(self.now_s) for _ in range(VEHICLES)]
         self.world.on_step = self.take_step
-        self.run(1.5)
+        self.run(seconds)
 
     def teardown(self):
         if hasattr(self, "world"):
@@ -348,7 +309,8 @@ class VehicleMachine(RuleBasedStateMachine):
     def a_stopped_mission_has_no_goal(self):
         for number, known in enumerate(self.known):
             has_nodes = self.world.sequencer is not None and number in self.world.machines
-            is_settled = has_nodes and self.now_s - known.changed_s > PAUSED_S
+            is_told = has_nodes and self.world.radios[number].hears
+            is_settled = is_told and self.now_s - known.changed_s > PAUSED_S
             if known.is_stopped and is_settled and number in self.world.pilots:
                 assert self.world.pilots[number].goal is None, number
 

@@ -245,6 +245,17 @@ def test_a_mode_that_the_pilot_sets_before_take_off_stays(arming):
     assert arming.height_m < 0.02
 
 
+def test_a_bridge_without_permission_arms_no_vehicle_that_is_disarmed_before_take_off(autopilot):
+    flight = Flight(autopilot, Permissions())
+    assert flight.run(10.0, lambda: flight.state is State.READY)
+    flight.vehicle.armed = True  # by its pilot
+    assert flight.run(2.0, lambda: flight.machine.inputs.status.is_armed)
+    assert flight.machine.take_off(flight.now_s).is_accepted
+    flight.vehicle.armed = False
+    assert not flight.run(6.0, lambda: flight.vehicle.armed)
+    assert "arm by hand" in flight.machine.refusal
+
+
 def test_never_arms_without_permission(autopilot):
     flight = Flight(autopilot, Permissions())
     assert flight.run(10.0, lambda: flight.state is State.READY)
