@@ -1,9 +1,10 @@
 """Evasion of moving obstacles: the command nearest to the wish that keeps clear of all of them.
 
-Each command of a polar grid is flown in thought, with the response of the body. It keeps clear if
-no moving obstacle can touch the robot within its greatest acceleration and speed, and if the robot
-can stop before what stands in the local costmap. The wish stays if it keeps clear; else the nearest
-velocity that does replaces it. There are two ways to fly:
+Each command of a polar grid is flown in thought, with the response of the body, as the Voronoi cell
+of the peers will leave it. It keeps clear if no moving obstacle can touch the robot within its
+greatest acceleration and speed, and if the robot can stop before what stands in the local costmap.
+The wish stays if it keeps clear; else the nearest velocity that does replaces it. There are two
+ways to fly:
 
 * The robot keeps clear for a time, ``horizon``. Where no velocity does, it flies the one with which
   an obstacle needs the greatest acceleration to touch it. This is for what does not react.
@@ -151,7 +152,7 @@ class Evasion(CommandFilter):
         wished = np.array(pose.rotate(wish.vx_mps, wish.vy_mps))
         now = np.array(pose.rotate(velocity.vx_mps, velocity.vy_mps))
         speed_mps = max(self.params.max_speed_mps, usual_mps)
-        commands = np.concatenate([[wished], polar_grid(speed_mps)])
+        commands = self._limited(np.concatenate([[wished], polar_grid(speed_mps)]), situation)
         needed_mps2 = self._needed_mps2(commands, now, tracks, situation)
         is_clear = needed_mps2 >= self.params.max_acceleration_mps2
         if is_clear[0]:
@@ -165,6 +166,15 @@ class Evasion(CommandFilter):
             best = -now
         vx_mps, vy_mps = Pose2D(0.0, 0.0, -pose.yaw_rad).rotate(*best.tolist())
         return replace(wish, vx_mps=vx_mps, vy_mps=vy_mps)
+
+    def _limited(self, commands: Floats, situation: Situation) -> Floats:
+        """Return what peers leave of commands, float64[c, 2] in the local costmap's frame."""
+        from_local = situation.local_from_global.inverse()
+        in_map = np.column_stack(from_local.rotate(*commands.T))
+        limited = situation.peers.limit_velocities(
+            in_map, situation.map_pose, situation.velocity, situation.period_s
+        )
+        return np.column_stack(situation.local_from_global.rotate(*limited.T))
 
     def _needed_mps2(
         self, commands: Floats, velocity: Floats, tracks: Tracks, situation: Situation

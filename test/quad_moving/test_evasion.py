@@ -32,6 +32,7 @@ HOVER = Command(Twist2D(), StopReason.IDLE)
 PLANNER = TrajectoryPlannerParams(holonomic_robot=True, max_vel_x_mps=0.5)
 PLAIN = {"max_speed": 1.0, "horizon": 3.0, "max_acceleration": 0.0}
 PEOPLE = {"max_speed": 1.0, "horizon": 0.0, "max_acceleration": 6.0}
+ALONE = SimpleNamespace(limit_velocities=lambda velocities, *_: velocities)
 SPEC = GridSpec(160, 160, 0.05, -4.0, -4.0)
 
 
@@ -48,12 +49,12 @@ def tracks(*states, suspects=()):
     )
 
 
-def situation(seen, pose=HERE, velocity=None, costs=None, now_s=10.0):
+def situation(seen, pose=HERE, velocity=None, costs=None, now_s=10.0, peers=ALONE):
     costs = np.zeros(SPEC.shape, np.uint8) if costs is None else costs
     costmap = SimpleNamespace(spec=SPEC, costs=costs, inscribed_radius_m=0.35)
     velocity = velocity or Twist2D()
     return Situation(
-        now_s, 0.1, pose, pose, HERE, velocity, velocity, None, costmap, PLANNER, seen, None
+        now_s, 0.1, pose, pose, HERE, velocity, velocity, None, costmap, PLANNER, seen, peers
     )
 
 
@@ -157,6 +158,15 @@ def test_commands_are_in_the_robots_frame():
     turned = Pose2D(0.0, 0.0, math.pi / 2)
     found = evade(HOVER, tracks([2.0, 0.2, -1.0, 0.0]), pose=turned)
     assert found.velocity.vx_mps < -0.2
+
+
+def test_a_peer_closes_a_side():
+    """Of velocities to the right nothing is left."""
+    right = SimpleNamespace(
+        limit_velocities=lambda velocities, *_: np.where(velocities[:, 1:] < -0.01, 0.0, velocities)
+    )
+    found = evade(HOVER, tracks([2.0, 0.2, -1.0, 0.0]), peers=right)
+    assert found.velocity.vy_mps > -0.01 and not found.velocity.is_zero
 
 
 def test_a_wall_closes_a_side():

@@ -30,7 +30,7 @@ from quad_nav.peers.peer_tracker import PeerTracker
 from quad_nav.peers.right_of_way import MOVING_OBSTACLE, Yield, YieldDecision
 from quad_nav.peers.roundabout import Roundabout
 from quad_nav.peers.stand_off import StandOff
-from quad_nav.peers.voronoi_cell import LimitedCommand, limit_to_cell
+from quad_nav.peers.voronoi_cell import LimitedCommand, limit_to_cell, limited_velocities
 from quad_nav.peers.yielding import YieldRules
 from quad_nav.timing import StallTimer
 
@@ -320,6 +320,26 @@ class PeerCoordinator:
             pose,
             velocity,
             command,
+            self._cell_peers,
+            self._tracker.safety_radius_m,
+            control_period_s + LATENCY_S,
+        )
+
+    def limit_velocities(
+        self,
+        velocities: NDArray[np.float64],
+        pose: Pose2D,
+        velocity: Twist2D,
+        control_period_s: float,
+    ) -> NDArray[np.float64]:
+        """Return what the cell leaves of commands, float64[c, 2], along the axes of ``map``.
+
+        Other arguments are as for ``limit``.
+        """
+        return limited_velocities(
+            velocities,
+            pose,
+            velocity,
             self._cell_peers,
             self._tracker.safety_radius_m,
             control_period_s + LATENCY_S,

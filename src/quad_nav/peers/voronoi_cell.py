@@ -92,6 +92,39 @@ def limit_to_cell(
     return LimitedCommand(Twist2D(vx_mps, vy_mps, fraction * command.vyaw_radps), nearest.name)
 
 
+def limited_velocities(
+    velocities: NDArray[np.float64],
+    pose: Pose2D,
+    velocity: Twist2D,
+    peers: Sequence[Peer],
+    safety_radius_m: float,
+    hold_s: float,
+) -> NDArray[np.float64]:
+    """Return what the cell leaves of many commands that do not turn, for planning.
+
+    Args:
+        velocities: Commands, float64[c, 2], m/s along the axes of ``map``.
+        pose: Robot pose in ``map``.
+        velocity: Current velocity in the robot's frame.
+        peers: Peers whose state is fresh.
+        safety_radius_m: Robot radius plus margin.
+        hold_s: How long a command may stay in force.
+
+    Returns:
+        float64[c, 2], shorter velocities with the same courses, 0 where the robot would turn.
+    """
+    coasting = COASTING_S * np.array(pose.rotate(velocity.vx_mps, velocity.vy_mps))
+    parts = np.ones(len(velocities))
+    for peer in peers:
+        dx_m, dy_m = peer.x_m - pose.x_m, peer.y_m - pose.y_m
+        room_m = _room_towards(dx_m, dy_m, coasting, safety_radius_m)
+        towards = np.array([dx_m, dy_m]) / max(math.hypot(dx_m, dy_m), 1e-9)
+        carried_m = np.maximum(hold_s * (velocities @ towards), 1e-9)
+        parts = np.minimum(parts, room_m / carried_m)
+    limited: NDArray[np.float64] = velocities * np.where(parts < MIN_FRACTION, 0.0, parts)[:, None]
+    return limited
+
+
 def _peers_in_reach(
     command: Twist2D,
     coasting: NDArray[np.float64],

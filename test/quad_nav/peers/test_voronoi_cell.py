@@ -13,7 +13,7 @@ from quad_nav.peers.peer import (
     Intention,
     Peer,
 )
-from quad_nav.peers.voronoi_cell import COASTING_S, limit_to_cell
+from quad_nav.peers.voronoi_cell import COASTING_S, limit_to_cell, limited_velocities
 
 SAFETY_RADIUS_M = 0.4
 STANDING = Twist2D()
@@ -151,3 +151,15 @@ def test_peers_out_of_reach_make_no_difference():
         assert limit_to_cell(*arguments, far, SAFETY_RADIUS_M, 0.25).command == command
         limited += bool(alone.limited_by)
     assert 30 < limited < 270
+
+
+def test_many_velocities_are_limited_as_single_commands():
+    """The bisector is 0.55 m away; without the radius of 0.5 m, 0.05 m are left for 0.25 s."""
+    ahead = Peer("ahead", 1.1, 0.0, -0.2, 0.0, 0.0)
+    velocities = np.array([[0.4, 0.4], [0.1, 0.0], [-0.4, 0.4], [1.3, 0.0], [1.4, 0.0]])
+    here = Pose2D(0.0, 0.0)
+    limited = limited_velocities(velocities, here, Twist2D(), [ahead], 0.5, 0.25)
+    expected = [[0.2, 0.2], [0.1, 0.0], [-0.4, 0.4], [0.2, 0.0], [0.0, 0.0]]
+    np.testing.assert_allclose(limited, expected)
+    one = limit_to_cell(here, Twist2D(), Twist2D(0.4, 0.4), [ahead], 0.5, 0.25).command
+    np.testing.assert_allclose([one.vx_mps, one.vy_mps], limited[0])
