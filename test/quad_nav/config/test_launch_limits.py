@@ -218,9 +218,9 @@ def test_recordings_hold_known_parameters_alone():
     flown = config.load(tree).to_tree()
     assert "hidden8" in json.dumps(flown)
     sequences = {"quad0": GoalSequence(())}
-    (robot,) = mission_info(sequences, [flown], 0.1)["robots"]
-    assert "hidden8" not in json.dumps(robot)
-    recorded = robot["parameters"]
+    (robot,) = mission_info(sequences, [flown], 0.1).robots
+    recorded = robot.parameters
+    assert "hidden8" not in json.dumps(recorded)
     assert recorded["recovery_behaviors"] == [{"name": "r", "type": "ClearCostmapRecovery"}]
     assert recorded["global_costmap"]["width"] == 12.0
     assert recorded["local_costmap"]["inflation_layer"]["inflation_radius"] == 0.4

@@ -94,7 +94,7 @@ def test_without_scan_validation_the_robot_follows_a_frozen_scan(tmp_path):
     for file in (ROOT / "config" / "default").iterdir():
         text = file.read_text()
         if file.name == "move_base_params.yaml":
-            text += "  reject_implausible_scans: false\n"
+            text += "reject_implausible_scans: false\n"
         (config / file.name).write_text(text)
     fault = FrozenScans(BEGIN_S, END_S)
     fly_with(fault, tmp_path, str(config))
