@@ -39,12 +39,13 @@ web: venv  ## The tests of the web page in a real browser: make web TEST=goal
 	@scripts/make_venv .venv requirements-test.txt requirements-web.txt requirements-web-test.txt
 	QUAD_CHROMIUM=$$(scripts/chromium) $(PYTHON) -m pytest --timeout 90 test/web $(if $(TEST),-k $(TEST))
 
-lint: venv  ## ruff, mypy and the structure of the sources
+lint: venv  ## ruff, mypy, the structure of the sources, and their sizes
 	@scripts/make_venv .venv requirements-test.txt requirements-web.txt requirements-lint.txt
 	$(PYTHON) -m ruff format --check
 	$(PYTHON) -m ruff check
 	$(PYTHON) -m mypy
 	$(PYTHON) -m pytest -q test/project/test_structure.py test/project/test_imports.py
+	scripts/sizes
 
 # The PATH has ruff, which formats the signatures. The variable silences an advertisement.
 docs: venv  ## The documentation as a site, in site/; warnings are errors
