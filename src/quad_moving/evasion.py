@@ -79,14 +79,19 @@ class EvasionParams:
     )
     horizon_s: float = number(
         "horizon",
-        2.0,
+        1.5,  # at 2 m/s^2 the robot leaves a person's way in 1.2 s
         "s",
         0,
         10,
         "Time for which the robot keeps clear; 0: until it is at rest, where it may be touched.",
     )
     max_acceleration_mps2: float = number(
-        "max_acceleration", 1.0, "m/s^2", 0, 100, "Greatest acceleration of obstacles."
+        "max_acceleration",
+        1.0,  # people who walk curves; 1.1 m aside within the horizon
+        "m/s^2",
+        0,
+        100,
+        "Greatest acceleration of obstacles.",
     )
     max_obstacle_speed_mps: float = number(
         "max_obstacle_speed",
