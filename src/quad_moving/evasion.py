@@ -180,6 +180,8 @@ class Evasion(CommandFilter):
             best = commands[int(np.argmin(np.where(is_clear, away_mps, np.inf)))]
         elif self.params.horizon_s > 0.0 and needed_mps2.max() > BLOCKED:
             best = commands[int(np.argmax(needed_mps2))]
+        elif self.params.horizon_s > 0.0 and np.hypot(*now) <= usual_mps:
+            return None  # the robot is too near to what stands: the navigator leads it out
         else:
             best = -now
         vx_mps, vy_mps = Pose2D(0.0, 0.0, -pose.yaw_rad).rotate(*best.tolist())
