@@ -127,7 +127,7 @@ def _stops_in_time(
 ) -> bool:
     """Return whether a robot that follows a command and then stops comes into nothing.
 
-    One that is too near to something already may leave it.
+    One that is too near to something already has to leave it while it follows the command.
     """
     inside = _is_blocked(standing, 0.0, 0.0)
     state = (0.0, 0.0, velocity[0], velocity[1])
@@ -135,9 +135,10 @@ def _stops_in_time(
     while k < flight.hold or math.hypot(state[2], state[3]) >= body.still_mps:
         k += 1
         state = _moved(body, flight.step_s, state, command, k > flight.hold)
-        if not inside and _is_blocked(standing, state[0], state[1]):
+        is_leaving = inside and k <= flight.hold
+        if not is_leaving and _is_blocked(standing, state[0], state[1]):
             return False
-    return not inside or not _is_blocked(standing, state[0], state[1])
+    return not _is_blocked(standing, state[0], state[1])
 
 
 @njit(cache=True, nogil=True)

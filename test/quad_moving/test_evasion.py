@@ -204,6 +204,11 @@ def test_a_robot_that_is_fast_from_an_evasion_brakes_before_a_wall():
     assert evasion.filter(Command(AHEAD), fast).velocity.vx_mps <= 0.0
 
 
+def test_a_robot_that_is_too_near_to_what_stands_is_left_to_the_navigator():
+    costs, command = np.full(SPEC.shape, LETHAL, np.uint8), Command(AHEAD)
+    assert evade(command, tracks([2.0, 0.0, -1.0, 0.0]), costs=costs) is command
+
+
 def test_a_robot_among_people_stands_while_somebody_can_reach_it():
     command = Command(AHEAD)
     near, far = tracks([1.1, 0.0, -1.0, 0.0]), tracks([3.5, 0.0, -1.0, 0.0])
