@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import os
 import subprocess
 import sys
@@ -10,8 +9,8 @@ from pathlib import Path
 from typing import Dict, Iterator, List, Set
 
 import pytest
+from source_imports import SOURCES, imported_names, package_of
 
-SOURCES = Path(__file__).resolve().parents[2] / "src"
 CORE = "quad_nav"
 ADD_ONS = ("quad_moving", "quad_vehicles", "quad_web", "quad_tune", "quad_bench", "quad_rl")
 
@@ -212,24 +211,6 @@ def modules() -> Iterator[Path]:
 def unit_of(path: Path) -> str:
     """`costmap` for quad_nav/costmap/layered.py, `grid` for quad_nav/grid.py."""
     return path.relative_to(SOURCES / CORE).with_suffix("").parts[0]
-
-
-def package_of(path: Path) -> List[str]:
-    """The dotted parts of the package that the module's relative imports start from."""
-    return list(path.relative_to(SOURCES).parent.parts)
-
-
-def imported_names(source: str, package: List[str]) -> Set[str]:
-    """The dotted names that the source imports anywhere, `from a import b` as `a.b`."""
-    names = set()
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            names.update(alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) - node.level + 1] if node.level else []
-            parts = [*base, *(node.module or "").split(".")] if node.module else base
-            names.update(".".join([*parts, alias.name]) for alias in node.names)
-    return names
 
 
 def forbidden_imports(path: Path, names: Set[str]) -> List[str]:

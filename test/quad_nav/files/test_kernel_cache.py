@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from test_imports import imported_names, package_of
+from source_imports import imported_names, package_of
 
 from quad_nav.cli.options import show_warnings
 from quad_nav.files import cache_folder, kernel_cache
