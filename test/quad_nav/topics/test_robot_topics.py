@@ -13,7 +13,7 @@ from quad_nav.recording import messages
 from quad_nav.topics.right_of_way import Kind
 from quad_nav.topics.robot_topics import ROBOT_TOPICS, RobotStatus, RobotTopicSchedule
 
-PAGE = Path(__file__).parents[3] / "docs" / "recording.md"
+PAGE = Path(__file__).parents[3] / "docs" / "topics.md"
 WAITING = YieldDecision("quad1", Yield.WAIT)
 MAKING_ROOM = YieldDecision("quad2", Yield.MAKE_ROOM, Pose2D(1.5, -2.25, 0.3))
 
@@ -28,7 +28,7 @@ def test_a_row_makes_messages_of_its_type_and_is_on_the_page(topic) -> None:
     message = messages.stamped(topic.kind, fields, 1)
     back = messages.decode(messages.encode(message), topic.kind)
     assert {name: getattr(back, name) for name in fields} == dict(fields)
-    assert f"| `{topic.name}` | {topic.kind}, each change" in PAGE.read_text()
+    assert f"| `{topic.name}` | {topic.kind}, latched" in PAGE.read_text()
 
 
 def test_names_are_unique() -> None:
