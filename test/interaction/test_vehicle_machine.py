@@ -145,6 +145,8 @@ class VehicleMachine(RuleBasedStateMachine):
             is_left_out = not is_done or f"quad{number}: " in response.message
             if not is_done and request.takes_off and not known.is_armed:
                 known.may_take_off = might_take_off or self.is_asked_to_take_off(number)
+            if not request.takes_control and known.taken_s is not None:
+                known.taken_s = self.now_s  # it lands, unless its pilot still moves the sticks
             if is_left_out or not request.takes_control:
                 continue
             is_down = not known.is_armed and request.asked_s - known.disarmed_s > TOLD_S
