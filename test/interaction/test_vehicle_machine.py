@@ -158,11 +158,11 @@ class VehicleMachine(RuleBasedStateMachine):
 
     def check_sent(self, number, known, radio):
         """Check what a bridge has sent since the last step."""
-        is_asked = any(one.takes_control and number in one.before for one in self.requests)
+        asked = [one for one in self.requests if number in one.before]
         is_taken = known.taken_s is not None and self.now_s - known.taken_s > TOLD_S
-        if is_taken and not is_asked:
+        if is_taken and not any(one.takes_control for one in asked):
             wrong = [fields for _, fields in radio.orders if fields["command"] in (ARM, TAKE_OFF)]
-            if wrong or radio.setpoints:
+            if wrong or (radio.setpoints and not asked):
                 self.faults.append(f"{self.now_s:.2f}: vehicle {number} is not its bridge's")
         for at_s, fields in radio.setpoints:
             late_s = at_s - self.world.commanded_s[number]
