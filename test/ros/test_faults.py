@@ -30,7 +30,7 @@ CONTROL_PERIOD_S, BLIND_S = 0.1, 0.5
 TRANSPORT_S = 0.3  # delay of messages on a busy machine
 LASTS_S = 3.0
 PLACES = [(1.0, 8.0), (1.0, 2.0)]
-REPORT = os.environ.get("QUAD_FAULTS_REPORT", "")  # file for the figures, set by bench/faults.py
+REPORT = os.environ.get("QUAD_FAULTS_REPORT", "")  # a file that the figures are added to
 
 
 class Faults(FlightCase):
