@@ -182,6 +182,8 @@ class VehicleMachine(RuleBasedStateMachine):
     def the_pilot(self, number, does):
         vehicle, known = self.touch(number)
         machine = self.world.machines.get(number)
+        if does == RETURNS_MODE and machine is None:
+            return  # a pilot gives the mode to no bridge that is dead
         state, was_ours = machine and machine.state, vehicle.mode == vehicle.kind["control"]
         is_ours = state in (State.FLYING, State.HOLDING)
         if does in (CHANGES_MODE, MOVES_STICK) and is_ours and self.world.radios[number].hears:
