@@ -1,9 +1,9 @@
 """Fly among people and other things that move without telling.
 
-``Tracker`` is a scan filter: it tells what moves from what stands. ``Evasion`` is a command filter:
-it keeps the robot clear of what moves. Reading order: ``tracker``, ``moving_points`` with
+``Tracker`` is a scan filter: it finds and tracks moving obstacles. ``Evasion`` is a command filter:
+it keeps the robot clear of them. Reading order: ``tracker``, ``moving_points`` with
 ``earlier_scans``, ``discs``, ``association``, ``kalman``, ``halted_obstacles``; ``evasion`` with
-``first_contact``.
+``reachable``.
 """
 
 from __future__ import annotations

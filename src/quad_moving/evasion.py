@@ -197,7 +197,7 @@ class Evasion(CommandFilter):
 
 
 def obstacles_of(params: EvasionParams, tracks: Tracks, pose: Pose2D, radius_m: float) -> Obstacles:
-    """Return what moves or may move.
+    """Return the tracked obstacles, and those that may begin to move.
 
     Args:
         params: The parameters.

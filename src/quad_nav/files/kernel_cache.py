@@ -25,7 +25,7 @@ COMPILE_S = 60
 _THIS = Path(__file__).resolve()  # no part of a kernel
 SOURCES = _THIS.parents[2]
 _PACKAGE = SOURCES / "quad_nav"
-_IMPORT = re.compile(r"^(?:from|import) (quad_nav[\w.]*)(?: import (\w+))?", re.MULTILINE)
+_IMPORT = re.compile(r"^(?:from|import) (quad_[\w.]*)(?: import (\w+))?", re.MULTILINE)
 
 
 def find_cache_folder() -> Tuple[Optional[Path], List[str]]:

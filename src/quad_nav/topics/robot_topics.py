@@ -1,7 +1,7 @@
 """What a navigator says of its robot at each change: one row for each topic.
 
 The node publishes the rows, the recorder writes them. A further topic is a further row, whose type
-is a packaged one or one of ``msg/``, and a line in ``docs/recording.md``.
+is a packaged one or one of ``msg/``, and a line in ``docs/topics.md``.
 """
 
 from __future__ import annotations
