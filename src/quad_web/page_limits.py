@@ -28,7 +28,7 @@ _MAX_NAME = 100  # characters of what a page calls itself; NiceGUI's names have 
 _NAMES = ("client_id", "tab_id", "old_tab_id", "document_id")
 _HANDSHAKE = "quad.handshake"  # key of a connection that had one
 _TAB_STORAGE_S = 60.0  # nothing is stored there
-_PACKAGE = Path(__file__).parents[1]
+_PACKAGE = Path(__file__).parent
 
 
 class _Refused(QuadError):
