@@ -13,25 +13,11 @@ import rosnode
 import rospy
 import rostest
 from flight_case import PATIENCE_S, Latest, pid_of
+from processes import descendants, runs
 from rosgraph_msgs.msg import Clock
 
 ROOT = Path(__file__).resolve().parents[2]
 NODE, CONFIG = str(ROOT / "nodes" / "simulator"), str(ROOT / "config" / "default")
-
-
-def children(pid):
-    """Numbers of the processes that a process has started, and of those that these have."""
-    found = []
-    for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
-        found += [int(child), *children(int(child))]
-    return found
-
-
-def runs(pid):
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
 
 
 class ComposedProcesses(unittest.TestCase):
@@ -64,7 +50,7 @@ class ComposedProcesses(unittest.TestCase):
             simulator = self.start()
             self.wait(lambda: pid_of("/fleet1") is not None, "/fleet1")
             rospy.wait_for_service("/simulation/start", PATIENCE_S)
-            workers = children(simulator.pid)
+            workers = descendants(simulator.pid)
             self.assertIn(pid_of("/fleet1"), workers)
             simulator.send_signal(number)
             self.assertEqual(simulator.wait(PATIENCE_S), status)
@@ -75,7 +61,7 @@ class ComposedProcesses(unittest.TestCase):
             simulator = self.start(rate=1000.0, start_paused=False)
             clock = Latest("/clock", Clock)
             self.wait(lambda c=clock: c.count > 100, "a running simulation")
-            workers = children(simulator.pid)
+            workers = descendants(simulator.pid)
             rosnode.kill_nodes(["/simulator"])
             self.assertEqual(simulator.wait(PATIENCE_S), 0)
             self.assertNotIn(b"Traceback", simulator.stderr.read())

@@ -14,6 +14,7 @@ import unittest
 from pathlib import Path
 
 import rostest
+from processes import descendants, read, words
 
 FLY = Path(__file__).resolve().parents[2] / "scripts" / "fly"
 PATIENCE_S = 90.0
@@ -25,7 +26,8 @@ TCP_LISTENS, UDP_IS_BOUND = "0A", "07"
 def servers(processes):
     """{(node, address)} of each socket on which one of the processes can be reached."""
     found = set()
-    for pid, node in processes.items():
+    for pid in processes:
+        node = node_of(pid)
         sockets = inodes(pid)
         for table, state in (
             ("tcp", TCP_LISTENS),
@@ -43,30 +45,22 @@ def servers(processes):
 def inodes(pid):
     """Of the sockets that a process has open."""
     links = []
-    for name in os.listdir(f"/proc/{pid}/fd"):
+    try:
+        names = os.listdir(f"/proc/{pid}/fd")
+    except (FileNotFoundError, ProcessLookupError):
+        return set()  # the process has ended since
+    for name in names:
         try:
             links.append(os.readlink(f"/proc/{pid}/fd/{name}"))
-        except FileNotFoundError:
+        except (FileNotFoundError, ProcessLookupError):
             continue  # closed since
     return {match.group(1) for match in map(re.compile(r"socket:\[(\d+)\]").match, links) if match}
 
 
-def descendants(pid):
-    """{pid: name} of a process and what it started, and so on."""
-    found = {}
-    for child in read(f"/proc/{pid}/task/{pid}/children").split():
-        found.update(descendants(int(child)))
-    words = read(f"/proc/{pid}/cmdline").split("\0")
-    names = [Path(word).name for word in words if word]
-    found[pid] = next((name for name in names if name in NODES), "")
-    return found
-
-
-def read(path):
-    try:
-        return Path(path).read_text()
-    except (FileNotFoundError, ProcessLookupError):
-        return ""  # it has ended since
+def node_of(pid):
+    """Name of the node that a process runs, or ""."""
+    names = [Path(word).name for word in words(pid) if word]
+    return next((name for name in names if name in NODES), "")
 
 
 class Network(unittest.TestCase):
@@ -100,7 +94,7 @@ class Network(unittest.TestCase):
         end = time.monotonic() + PATIENCE_S
         found = set()
         while time.monotonic() < end and flight.poll() is None:
-            found = servers(descendants(flight.pid))
+            found = servers([flight.pid, *descendants(flight.pid)])
             if NODES <= {node for node, _ in found}:
                 return found
             time.sleep(0.2)

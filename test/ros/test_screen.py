@@ -13,6 +13,7 @@ import unittest
 from pathlib import Path
 
 import rostest
+from processes import descendants, words
 
 ROOT = Path(__file__).resolve().parents[2]
 FLY = [str(ROOT / "scripts" / "fly")]
@@ -88,24 +89,17 @@ class Screen(unittest.TestCase):
     def test_a_dead_simulator_ends_the_flight_with_the_reason(self):
         flight = self.fly(FLY)
         self.wait_for("goal 1 of", flight)
-        os.kill(child(flight.pid, "/simulator"), signal.SIGKILL)
+        simulator = next(
+            pid
+            for pid in descendants(flight.pid)
+            if any(word.endswith("/simulator") for word in words(pid))
+        )
+        os.kill(simulator, signal.SIGKILL)
         self.assertEqual(flight.wait(PATIENCE_S), 1)
         text = self.printed.read_text()
         self.assertIn("REQUIRED process [simulator-2] has died!", text)
         self.assertIn("The mission ended early: the simulator has died.", text)
         self.assertEqual(json.loads(self.result.read_text())["exit_status"], 1)
-
-
-def child(pid, name):
-    """Process number of the descendant that runs the program of this name; None without one."""
-    for one in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
-        words = Path(f"/proc/{one}/cmdline").read_text().split("\0")
-        if any(word.endswith(name) for word in words):
-            return int(one)
-        found = child(int(one), name)
-        if found is not None:
-            return found
-    return None
 
 
 if __name__ == "__main__":
