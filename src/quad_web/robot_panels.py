@@ -16,6 +16,7 @@ from nicegui import ui
 from quad_nav.errors import printable
 from quad_nav.geometry import Pose2D, angle_difference
 from quad_nav.mission.goal import goal_faults
+from quad_nav.topics.robot_topics import COLUMNS
 from quad_web.flight_bar import enable, why_idle
 from quad_web.live_table import LiveTable, column
 from quad_web.page_client import PageClient
@@ -28,7 +29,7 @@ _COLUMNS = [
     column("robot", "#", "robot", align="right"),
     column("state", "state", "state", hint="reason"),
     column("goal", "goal"),
-    column("distance_m", "dist m", digits=2, align="right"),
+    *(column(topic.name, topic.column, digits=2, align="right") for topic in COLUMNS),
     column("speed_mps", "m/s", digits=2, align="right"),
     column("gap_m", "gap m", digits=2, align="right"),
     column("recoveries", "recov", "battery"),
@@ -46,7 +47,7 @@ def table_row(status: Mapping[str, Any], colour: str) -> Dict[str, Any]:
         "state": printable(status.get("state", "")),
         "reason": printable(status.get("reason", "")),
         "goal": None if goal is None else f"{goal}/{goals}" if goals else str(goal),
-        "distance_m": _rounded(status.get("distance_m")),
+        **{topic.name: _rounded(status.get(topic.name)) for topic in COLUMNS},
         "speed_mps": _rounded(status.get("speed_mps")),
         "gap_m": _rounded(status.get("gap_m")),
         "recoveries": status.get("recoveries"),
@@ -265,7 +266,7 @@ class RobotCard:
             "position": f"{pose.x_m:.2f}, {pose.y_m:.2f} m" if pose else "–",
             "heading": f"{heading_deg(pose):.0f}°" if pose else "–",
             "speed": _with_unit(shown["speed_mps"], "m/s"),
-            "goal": _goal_text(shown["goal"], shown["distance_m"]),
+            "goal": _goal_text(shown["goal"], shown["goal_distance"]),
             "gap": _with_unit(shown["gap_m"], "m"),
             "recoveries left": f"{used[1] - used[0]} of {used[1]}" if used and used[1] else "–",
         }

@@ -68,7 +68,7 @@ def fleet() -> FleetState:
             "state": "flying",
             "goal": 1,
             "goals": 3,
-            "distance_m": 1.234,
+            "goal_distance": 1.234,
             "speed_mps": 0.5,
             "gap_m": None,
             "recoveries": [1, 4],

@@ -130,7 +130,7 @@ def test_rows_and_samples_are_those_of_the_time(flight):
     items = items_at(flight, 6.0)
     first, second = items["status"].data["rows"]
     assert (first["state"], first["goal"], first["goals"]) == ("flying", 1, 2)
-    assert first["distance_m"] == pytest.approx(4.0 - x_at(6.0))
+    assert first["goal_distance"] == pytest.approx(4.0 - x_at(6.0))
     gap_m = 8.0 - x_at(6.0) - 2 * BODY_RADIUS_M
     assert first["gap_m"] == second["gap_m"] == pytest.approx(gap_m, abs=1e-5)
     gap, clearance, speed, cycle = items["samples"].arrays["values"][0]

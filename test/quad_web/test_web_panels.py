@@ -48,7 +48,7 @@ def test_rows_of_robots_are_lost_if_their_source_says_so(age_s, text, state):
     row = robots.table_row({**status, "state": state, "age_s": age_s}, "#123456")
     assert (row["age"], row["lost"]) == (text, state == "lost")
     assert row["state"] == state
-    assert (row["goal"], row["distance_m"], row["gap_m"]) == ("1/3", 1.23, None)
+    assert (row["goal"], row["goal_distance"], row["gap_m"]) == ("1/3", 1.23, None)
 
 
 def test_nothing_in_a_row_is_a_control_character():

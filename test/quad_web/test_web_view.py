@@ -187,7 +187,7 @@ def test_the_items_tell_where_the_robots_are_and_what_they_do():
     assert flight["reason"] == "time limit of 3 s"
     first, second = state.item("status").data["rows"]
     assert (first["goal"], first["goals"], first["state"]) == (1, 3, "stopped")
-    assert first["distance_m"] == pytest.approx(np.hypot(*(pose[0, :2] - (3.0, 6.5))), abs=1e-5)
+    assert first["goal_distance"] == pytest.approx(np.hypot(*(pose[0, :2] - (3.0, 6.5))), abs=1e-5)
     assert second["gap_m"] == pytest.approx(np.hypot(*(pose[0, :2] - pose[1, :2])) - 0.6, abs=1e-5)
     states = [goal["state"] for goal in state.item("goals").data["goals"]]
     assert states == ["active", "pending", "pending"] * 2

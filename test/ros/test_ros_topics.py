@@ -13,6 +13,8 @@ from nav_msgs.msg import OccupancyGrid, Odometry, Path
 from sensor_msgs.msg import LaserScan
 from tf2_msgs.msg import TFMessage
 
+from quad_nav.topics.robot_topics import ROBOT_TOPICS
+
 TYPES = {
     "/cmd_vel{i}": "geometry_msgs/Twist",
     "/odom{i}": "nav_msgs/Odometry",
@@ -33,8 +35,7 @@ TYPES = {
     "/move_base{i}/local_costmap/costmap": "nav_msgs/OccupancyGrid",
     "/move_base{i}/local_costmap/costmap_updates": "map_msgs/OccupancyGridUpdate",
     "/move_base{i}/local_costmap/footprint": "geometry_msgs/PolygonStamped",
-    "/move_base{i}/state": "std_msgs/String",
-    "/move_base{i}/right_of_way": "quad/RightOfWay",
+    **{f"/move_base{{i}}/{topic.name}": topic.kind for topic in ROBOT_TOPICS},
     "/quad/flight": "quad/FlightInfo",
     "/simulation/contacts": "quad/Contact",
     "/move_base{i}/parameter_descriptions": "dynamic_reconfigure/ConfigDescription",

@@ -240,7 +240,7 @@ class SyntheticFleet:
                 "state": _STATES[(i + self._steps // 50) % len(_STATES)] if i else "flying",
                 "goal": 2,
                 "goals": 3,
-                "distance_m": 1.23 + i,
+                "goal_distance": 1.23 + i,
                 "speed_mps": SPEED_MPS,
                 "gap_m": 1.1 if self.n > 1 else None,
                 "recoveries": [i % 3, 4],

@@ -208,6 +208,8 @@ class Navigator(StateMachine):
             self.filters.reset()
         tick.state = self.state
         tick.yielding = self.peers.decision
+        tick.goal = None if self.peers.is_yield_manoeuvre else self.goal
+        tick.velocity = velocity
         return tick
 
     def _propose(self, tick: Tick, poses: RobotPoses, velocity: Twist2D) -> None:

@@ -98,6 +98,8 @@ class Tick:
         recovery: The recovery behaviour that started.
         outcome: End of the goal.
         yielding: The decision to yield that is in force.
+        goal: The goal in the global costmap's frame; None without one, also while it yields.
+        velocity: Velocity that the navigator was given, in the robot's frame.
         limited_by: Name of the peer or thing for which a command filter holds the robot back, "" if
             none does.
         notes: Messages for the log that tell no fault.
@@ -116,6 +118,8 @@ class Tick:
     recovery: Optional[RecoveryStart] = None
     outcome: Optional[Outcome] = None
     yielding: Optional[YieldDecision] = None
+    goal: Optional[Pose2D] = None
+    velocity: Twist2D = Twist2D()
     limited_by: str = ""
     notes: List[str] = field(default_factory=list)
     warnings: List[str] = field(default_factory=list)

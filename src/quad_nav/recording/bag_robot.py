@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, List, Tuple
+from typing import Any, Dict, List, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D, Pose3D, yaw_from_quaternion
-from quad_nav.navigator.tick import State
 from quad_nav.recording.bag_checks import checked_pose, require_finite
 from quad_nav.recording.bag_file import Message
 from quad_nav.recording.messages import pose_from, stamp_ns
 from quad_nav.recording.trace import RobotTrace, goal_traces
 from quad_nav.topics.flight_info import RobotInfo
 from quad_nav.topics.mission_events import MissionEvent
-from quad_nav.topics.right_of_way import RightOfWay, right_of_way_from_message
-
-_STATES = {state.value: state for state in State}
+from quad_nav.topics.robot_topics import RobotTopic
 
 
 class BagRobot:
@@ -32,12 +29,11 @@ class BagRobot:
         self.map_from_odom = Pose3D(0.0, 0.0, 0.0)
         self.odom_frame = ""
         self._odom_frames: List[Tuple[float, Pose2D]] = []
-        self._rights_of_way: List[Tuple[float, RightOfWay]] = []
+        self._said: Dict[str, List[Tuple[float, Any]]] = {}
         self._moves: List[Tuple[float, ...]] = []
         self._commands: List[Tuple[float, float, float, float]] = []
         self._cycles: List[float] = []
         self._plans: List[Tuple[float, NDArray[np.float64]]] = []
-        self._states: List[Tuple[float, State]] = []
         self._recoveries: List[Tuple[float, str]] = []
         self._events: List[MissionEvent] = []
 
@@ -62,14 +58,15 @@ class BagRobot:
             self._odom_frames.append((time_s, map_from_odom.to_2d()))
         self.odom_frame, self.map_from_odom = frame, map_from_odom
 
-    def add_right_of_way(self, message: Message) -> None:
-        """Add a change of what the robot does for its peers.
+    def add_said(self, message: Message, topic: RobotTopic) -> None:
+        """Add what the navigator says on a topic; what is unknown here is skipped.
 
         Raises:
-            ValueError: A value is missing or invalid.
+            ValueError: The message is not valid.
         """
-        right = right_of_way_from_message(message.content)
-        self._rights_of_way.append((message.stamp_ns / 1e9, right))
+        value = topic.read(message.content)
+        if value is not None:
+            self._said.setdefault(topic.name, []).append((message.stamp_ns / 1e9, value))
 
     def add_odometry(self, message: Message) -> None:
         """Add a ``nav_msgs/Odometry``.
@@ -130,12 +127,6 @@ class BagRobot:
                 plan = self.map_from_odom.to_2d().transform_poses(plan)
             self._plans.append((time_s, plan))
 
-    def add_state(self, message: Message) -> None:
-        """Add a navigator state; unknown states are skipped."""
-        state = _STATES.get(message.content.data)
-        if state is not None:
-            self._states.append((message.stamp_ns / 1e9, state))
-
     def add_cycle(self, message: Message) -> None:
         """Add a control cycle, from the action's feedback."""
         self._cycles.append(_seconds(message.content.feedback.base_position.header))
@@ -159,6 +150,10 @@ class BagRobot:
             info: What ``/quad/flight`` says of the robot.
         """
         moves = np.array(self._moves)
+        said = {
+            name: tuple((time_s - start_s, value) for time_s, value in values)
+            for name, values in self._said.items()
+        }
         commands = np.array(self._commands).reshape(-1, 4)
         return RobotTrace(
             info.name,
@@ -171,13 +166,13 @@ class BagRobot:
             np.array(self._cycles) - start_s,
             np.zeros(0),
             tuple((time_s - start_s, plan) for time_s, plan in self._plans),
-            tuple((time_s - start_s, state) for time_s, state in self._states),
+            said.get("state", ()),
             tuple((time_s - start_s, name) for time_s, name in self._recoveries),
             goal_traces(self._events, start_s),
             info.parameters,
             info.goals,
             tuple((time_s - start_s, pose) for time_s, pose in self._odom_frames),
-            tuple((time_s - start_s, right) for time_s, right in self._rights_of_way),
+            said,
         )
 
 

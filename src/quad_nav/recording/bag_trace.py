@@ -38,31 +38,23 @@ from quad_nav.topics.flight_info import (
     flight_info_from_message,
 )
 from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event_from_message
+from quad_nav.topics.robot_topics import ROBOT_TOPICS
 
 MAX_MEMORY_BYTES = 4 * 10**9
 """Limit for reading a recording: unpacked, it may be a thousand times larger."""
 LONGEST_FLIGHT_S = 30 * 24 * 3600.0
 """Longer flights are refused: two clocks in one recording differ by decades."""
-# Topic, type, and the method of ``BagRobot`` that adds its messages.
+_NODE = r"/move_base([0-9]{1,4})"
+# Topic, type, and what adds its messages.
 _ROBOT_TOPICS: Tuple[Tuple[str, str, Callable[[BagRobot, Message], None]], ...] = (
     (r"/odom([0-9]{1,4})", "nav_msgs/Odometry", BagRobot.add_odometry),
     (r"/cmd_vel([0-9]{1,4})", "geometry_msgs/Twist", BagRobot.add_command),
-    (r"/move_base([0-9]{1,4})/[^/]+/plan", "nav_msgs/Path", BagRobot.add_plan),
-    (r"/move_base([0-9]{1,4})/state", "std_msgs/String", BagRobot.add_state),
-    (
-        r"/move_base([0-9]{1,4})/feedback",
-        "move_base_msgs/MoveBaseActionFeedback",
-        BagRobot.add_cycle,
-    ),
-    (
-        r"/move_base([0-9]{1,4})/recovery_status",
-        "move_base_msgs/RecoveryStatus",
-        BagRobot.add_recovery,
-    ),
-    (
-        r"/move_base([0-9]{1,4})/right_of_way",
-        "quad/RightOfWay",
-        BagRobot.add_right_of_way,
+    (f"{_NODE}/[^/]+/plan", "nav_msgs/Path", BagRobot.add_plan),
+    (f"{_NODE}/feedback", "move_base_msgs/MoveBaseActionFeedback", BagRobot.add_cycle),
+    (f"{_NODE}/recovery_status", "move_base_msgs/RecoveryStatus", BagRobot.add_recovery),
+    *(
+        (f"{_NODE}/{topic.name}", topic.kind, functools.partial(BagRobot.add_said, topic=topic))
+        for topic in ROBOT_TOPICS
     ),
 )
 

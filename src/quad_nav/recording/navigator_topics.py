@@ -59,9 +59,9 @@ class NavigatorTopics:
         """
         stamp = stamp_at(tick.now_s)
         assert poses.in_global is not None and poses.in_local is not None
-        for topic, fields in self._schedule.pop(tick):
+        for topic, fields in self._schedule.pop(tick, poses.in_global):
             content = messages.stamped(topic.kind, fields, stamp)
-            self._write(topic.name, stamp, content, latched=True)
+            self._write(topic.name, stamp, content, latched=topic.is_latched)
         self._write_obstacles(tick.now_s, stamp)
         if tick.command is not None:
             self._topics.write(

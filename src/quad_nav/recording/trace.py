@@ -23,7 +23,6 @@ from quad_nav.sim.crowd_record import CrowdRecord
 from quad_nav.sim.movers import Movers
 from quad_nav.sim.scene import Scene
 from quad_nav.topics.mission_events import MissionEvent, mission_event
-from quad_nav.topics.right_of_way import RightOfWay
 from quad_nav.versions import versions
 
 
@@ -92,7 +91,7 @@ class RobotTrace:
         parameters: move_base's known parameters with ROS names; empty if unknown.
         mission: The goals of the goal file; empty if unknown.
         odom_frames: (time, pose in ``map``) pairs of the odometry frame, one for each change.
-        rights_of_way: (time, right of way) pairs, one for each change.
+        said: (time, value) pairs of each topic of ``ROBOT_TOPICS``, by name; recordings have them.
     """
 
     name: str
@@ -111,7 +110,7 @@ class RobotTrace:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     mission: Tuple[Goal, ...] = ()
     odom_frames: Tuple[Tuple[float, Pose2D], ...] = ()
-    rights_of_way: Tuple[Tuple[float, RightOfWay], ...] = ()
+    said: Mapping[str, Tuple[Tuple[float, Any], ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,9 @@ from quad_nav.loop.inspection import (
     Inspection,
     NavigatorView,
 )
-from quad_nav.mission.sequencer import Sequencer
 from quad_nav.offline.flight import Flight
 from quad_nav.sim.contacts import Contact
+from quad_nav.topics.robot_topics import COLUMNS, RobotStatus
 from quad_nav.topics.tracked_obstacles import track_rows
 from quad_web.offline.actions import HAS_ENDED, FlightActions
 from quad_web.view import rows
@@ -193,26 +193,31 @@ class FlightItems:
         if actions.state == "ended":
             state, speed_mps = "done" if sequencer.done else "stopped", 0.0
             reason = reason or HAS_ENDED
-        goal = None if sequencer.done else sequencer.index + 1
+        goal, active, body = (
+            sequencer.index + 1,
+            sequencer.active_goal,
+            self._flight.states[view.robot],
+        )
+        status = RobotStatus(
+            view.state,
+            view.decision,
+            view.limited_by,
+            None if active is None else active.pose,
+            body.map_from_base.to_2d(),
+            body.twist,
+        )
         return rows.status_row(
             view.robot,
             state,
-            goal=goal,
+            goal=None if sequencer.done else goal,
             goals=len(sequencer.sequence.goals),
-            distance_m=self._distance_m(view.robot, sequencer),
+            said={topic.name: topic.fields(status)["data"] for topic in COLUMNS},
             speed_mps=speed_mps,
             gap_m=float(sample[0]),
             recoveries=(view.recoveries_done, view.recoveries),
             lidar=actions.lidars[view.robot],
             reason=reason,
         )
-
-    def _distance_m(self, robot: int, sequencer: Sequencer) -> float:
-        active = sequencer.active_goal
-        if active is None:
-            return math.nan
-        x_m, y_m, _ = self._flight.states.poses[robot].tolist()
-        return math.hypot(active.goal.x_m - x_m, active.goal.y_m - y_m)
 
     def _cells(self, views: Sequence[NavigatorView], robots: FrozenSet[int]) -> List[Item]:
         positions, scene = self._flight.states.poses[:, :2], self._flight.setup.scene

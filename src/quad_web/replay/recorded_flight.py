@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bisect
-import math
 import re
 import time
 from pathlib import Path
@@ -195,16 +194,12 @@ class RecordedFlight:
             is_done=is_done,
             is_lost=age_s > LOST_AFTER_S,
         )
-        body = track.body(time_s)
-        distance_m = math.nan
-        if leg is not None and is_active:
-            distance_m = math.hypot(leg.pose.x_m - body[0], leg.pose.y_m - body[1])
         return rows.status_row(
             row,
             state,
             goal=leg.index + 1 if leg is not None and is_active else None,
             goals=len(goals) or None,
-            distance_m=distance_m,
+            said=track.columns(time_s),
             speed_mps=float(sample[2]),
             gap_m=float(sample[0]),
             recoveries=track.recoveries(time_s),

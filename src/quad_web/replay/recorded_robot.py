@@ -14,6 +14,7 @@ from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.mission.goal import Goal
 from quad_nav.recording.trace import GoalTrace, RobotTrace
 from quad_nav.topics.right_of_way import RightOfWay
+from quad_nav.topics.robot_topics import COLUMNS, goal_distance_m
 from quad_web.view import rows
 from quad_web.view.items import TRAIL_POINTS, TRAIL_SPACING_M, UNKNOWN_BODY
 
@@ -47,7 +48,9 @@ class RobotTrack:
         self.goals = robot.mission or _flown_goals(robot.goals)
         self._state_times_s = [time_s for time_s, _ in robot.states]
         self._plan_times_s = [time_s for time_s, _ in robot.plans]
-        self._right_times_s = [time_s for time_s, _ in robot.rights_of_way]
+        self._said_times_s = {
+            name: [time_s for time_s, _ in values] for name, values in robot.said.items()
+        }
         self._sent_s = [goal.sent_s for goal in robot.goals]
         self._spaced = _spaced(robot.positions_m[:, :2])
 
@@ -130,10 +133,22 @@ class RobotTrack:
         leg = self.leg(time_s)
         return "idle" if leg is None or not self.is_active(leg, time_s) else "controlling"
 
+    def said(self, name: str, time_s: float) -> Any:
+        """Return what the robot said last on a topic of ``ROBOT_TOPICS``; None if nothing."""
+        number = bisect.bisect_right(self._said_times_s.get(name, ()), time_s) - 1
+        return self.robot.said[name][number][1] if number >= 0 else None
+
     def right_of_way(self, time_s: float) -> RightOfWay:
         """Return what the robot does for its peers."""
-        number = bisect.bisect_right(self._right_times_s, time_s) - 1
-        return self.robot.rights_of_way[number][1] if number >= 0 else RightOfWay()
+        return self.said("right_of_way", time_s) or RightOfWay()
+
+    def columns(self, time_s: float) -> Dict[str, float]:
+        """Return the numbers of the topics in ``COLUMNS``; the distance to the goal is computed."""
+        leg, pose = self.leg(time_s), self.pose(time_s)
+        goal = leg.pose if leg is not None and self.is_active(leg, time_s) else None
+        said = {topic.name: self.said(topic.name, time_s) for topic in COLUMNS}
+        known = {name: value for name, value in said.items() if value is not None}
+        return {**known, "goal_distance": goal_distance_m(goal, pose and pose.to_2d())}
 
     def recoveries(self, time_s: float) -> Tuple[int, int]:
         """Return how many recovery behaviours began for the present goal, and how many exist."""
@@ -183,7 +198,7 @@ def events_of(robots: Sequence[RobotTrace]) -> List[RecordedEvent]:
                 )
         for at_s, name in robot.recoveries:
             events.append(RecordedEvent(at_s, "warning", row, f"recovery {name}"))
-        for at_s, right in robot.rights_of_way:
+        for at_s, right in robot.said.get("right_of_way", ()):
             if right.decision is not None:
                 events.append(RecordedEvent(at_s, "info", row, right.text))
     return events

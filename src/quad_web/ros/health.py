@@ -41,7 +41,6 @@ class Progress(NamedTuple):
 
     goal: Optional[int] = None
     goals: Optional[int] = None
-    distance_m: float = float("nan")
     is_done: bool = False
     is_stopped: bool = False
 
@@ -151,7 +150,6 @@ class FleetHealth:
         return Progress(
             None if is_done else _count(values.get("goal", "")),
             _count(values.get("goals", "")),
-            _number(values.get("distance_m", "")),
             is_done,
             values.get("stopped") == "True",
         )

@@ -10,22 +10,22 @@ from typing import Any, Dict, List, Mapping, Optional, Set, Tuple
 from move_base_msgs.msg import RecoveryStatus
 from quad.msg import Contact as ContactMessage
 from quad.msg import FlightInfo, MissionEvent
-from quad.msg import RightOfWay as RightOfWayMessage
 from rosgraph_msgs.msg import Log
+from roslib.message import get_message_class
 from std_msgs.msg import Time
 from visualization_msgs.msg import Marker, MarkerArray
 
 from quad_nav.errors import InputError, excerpt
 from quad_nav.geometry import yaw_from_quaternion
 from quad_nav.mission.actions import Event
-from quad_nav.peers.right_of_way import YieldDecision
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.topics.contacts import CONTACTS_TOPIC, contact_from_message
 from quad_nav.topics.flight_info import FLIGHT_TOPIC, RESET_TOPIC, flight_info_from_message
 from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event_from_message
-from quad_nav.topics.right_of_way import RightOfWay, right_of_way_from_message
+from quad_nav.topics.right_of_way import RightOfWay
+from quad_nav.topics.robot_topics import COLUMNS, ROBOT_TOPICS
 from quad_nav.topics.validation import MAX_MAGNITUDE
 from quad_web.ros.intake import Newest, Topic
 from quad_web.view.state import FleetState
@@ -35,6 +35,9 @@ _LEVELS = {Log.WARN: "warning", Log.ERROR: "error", Log.FATAL: "error"}
 _OUR_NODES = re.compile(r"/(simulator|sequencer|move_base\d+|fleet\d*|goal_router|web)")
 _ROBOT = re.compile(r"quad(\d{1,4})\b")
 _GOAL = re.compile(r"goal(\d{1,4})(_yaw)?")
+_COLUMNS = {topic.name for topic in COLUMNS}
+# The state comes with the diagnostics, which C++ move_base and a dead node do not publish.
+_HEARD = {topic.name: topic for topic in ROBOT_TOPICS if topic.name != "state"}
 _CONTACT = "CONTACT with"  # the sequencer repeats what the simulator has logged
 _ACTIVE_ALPHA, _REACHED_ALPHA = 0.95, 0.4  # of the spheres of goals, see topics.markers
 
@@ -69,7 +72,7 @@ class FlightReports:
         self._failed: Set[Tuple[int, int]] = set()
         self._goals = Newest("/goals", MarkerArray)
         self._rows: List[Dict[str, Any]] = []
-        self._right_of_way: Dict[int, RightOfWay] = {}
+        self._said: Dict[int, Dict[str, Any]] = {robot: {} for robot in range(robots)}
         self.recoveries: Dict[int, Tuple[int, int]] = {}
         self.sent_s: Dict[int, float] = {}
         self._lock = threading.Lock()
@@ -89,13 +92,14 @@ class FlightReports:
         topics["/goals"] = self._goals.topic
         for robot in range(self._robots):
             node = f"/move_base{robot}"
-            topics[f"{node}/right_of_way"] = Topic(RightOfWayMessage, self._on_right_of_way)
             topics[f"{node}/recovery_status"] = Topic(RecoveryStatus, self._on_recovery)
+            for name, topic in _HEARD.items():
+                topics[f"{node}/{name}"] = Topic(get_message_class(topic.kind), self._on_said)
         return topics
 
     def forget_navigator(self, robot: int) -> None:
         """Forget what a navigator has said that does not say anything any more."""
-        self._right_of_way.pop(robot, None)
+        self._said[robot].clear()
 
     # -- the flight ----------------------------------------------------------------------
 
@@ -170,28 +174,28 @@ class FlightReports:
     # -- robots --------------------------------------------------------------------------
 
     def _on_recovery(self, message: RecoveryStatus) -> None:
-        robot = _robot_of_topic(message)
+        robot, _ = _origin(message)
         if robot is not None:
             count = max(0, message.current_recovery_number) + 1
             self.recoveries[robot] = count, max(count, message.total_number_of_recoveries)
 
-    def _on_right_of_way(self, message: RightOfWayMessage) -> None:
-        robot = _robot_of_topic(message)
-        if robot is None:
+    def _on_said(self, message: Any) -> None:
+        robot, name = _origin(message)
+        if robot not in self._said:  # also None
             return
         try:
-            self._right_of_way[robot] = right_of_way_from_message(message)
+            self._said[robot][name] = _HEARD[name].read(message)
         except ValueError as error:
-            topic = f"/move_base{robot}/right_of_way"
-            self._warnings.warn(f"web: {topic}: message dropped: {error}", kind="right of way")
+            topic = f"/move_base{robot}/{name}"
+            self._warnings.warn(f"web: {topic}: message dropped: {error}", kind=name)
 
-    def decision(self, robot: int) -> Optional[YieldDecision]:
-        """Return a robot's decision to yield, None if it does not yield."""
-        return self._right_of_way.get(robot, RightOfWay()).decision
+    def right_of_way(self, robot: int) -> RightOfWay:
+        """Return what a robot does for its peers."""
+        return self._said[robot].get("right_of_way") or RightOfWay()
 
-    def limited_by(self, robot: int) -> str:
-        """Return the name of the robot that limits a robot's command, "" if none does."""
-        return self._right_of_way.get(robot, RightOfWay()).limited_by
+    def columns(self, robot: int) -> Dict[str, float]:
+        """Return the numbers that a navigator has told of the topics in ``COLUMNS``."""
+        return {name: value for name, value in self._said[robot].items() if name in _COLUMNS}
 
     def goal_rows(self) -> List[Dict[str, Any]]:
         """Return the rows of the item ``goals``, from the markers of the sequencer."""
@@ -234,8 +238,8 @@ class FlightReports:
         return [{**row, "yaw": yaws.get((row["robot"], row["index"]))} for row in rows]
 
 
-def _robot_of_topic(message: Any) -> Optional[int]:
-    """Return the number of the robot whose topic a message came from."""
+def _origin(message: Any) -> Tuple[Optional[int], str]:
+    """Return the number of the robot whose topic a message came from, and the name below it."""
     topic = message._connection_header.get("topic", "")
     found = re.match(r"/move_base(\d{1,4})/", topic)
-    return int(found[1]) if found else None
+    return (int(found[1]), topic[found.end() :]) if found else (None, "")

@@ -12,6 +12,7 @@ import rospy
 from quad_nav.geometry import Pose2D
 from quad_nav.scenario.rules import START_S
 from quad_nav.sim.simulation_params import FASTEST_RATE
+from quad_nav.topics.robot_topics import goal_distance_m
 from quad_web.ros.frames import Frames
 from quad_web.ros.health import LOST_AFTER_S, FleetHealth
 from quad_web.ros.intake import Subscriptions
@@ -203,18 +204,19 @@ class FlightSource:
             self._obstacles.solids(),
         )
         values = samples.arrays["values"].tolist()
-        status = [self._status_row(i, values[i]) for i in range(len(self._names))]
+        goals = self._goal_rows()
+        active = {row["robot"]: row for row in goals if row["state"] == "active"}
+        status = [self._status_row(i, values[i], active.get(i)) for i in range(len(self._names))]
+        rights = [reports.right_of_way(i) for i in range(len(self._names))]
         seldom = [
             rows.yields_item(
                 [
                     row
-                    for i in range(len(self._names))
-                    for row in rows.yield_rows(
-                        i, reports.decision(i), reports.limited_by(i), self._names
-                    )
+                    for i, right in enumerate(rights)
+                    for row in rows.yield_rows(i, right.decision, right.limited_by, self._names)
                 ]
             ),
-            rows.goals_item(self._goal_rows()),
+            rows.goals_item(goals),
             rows.contacts_item(reports.contacts, self._names),
         ]
         if self._version != reports.version:
@@ -240,7 +242,10 @@ class FlightSource:
             goals.append({"robot": robot, "index": index, **place, "state": "active"})
         return goals
 
-    def _status_row(self, robot: int, sample: Sequence[float]) -> Dict[str, Any]:
+    def _status_row(
+        self, robot: int, sample: Sequence[float], goal: Optional[Mapping[str, Any]]
+    ) -> Dict[str, Any]:
+        """Return a robot's row; ``goal`` is the row of its active goal."""
         navigator, silent_s, reason = self.health.navigator(robot)
         pose_age_s = float(self.bodies.ages_s()[robot])
         progress = self.health.progress(robot)
@@ -254,7 +259,7 @@ class FlightSource:
         state = rows.robot_state(
             navigator or "idle",
             speed_mps,
-            yielding=self.reports.decision(robot),
+            yielding=self.reports.right_of_way(robot).decision,
             is_done=progress.is_done,
             is_stopped=is_stopped,
             is_lost=bool(lost),
@@ -264,7 +269,7 @@ class FlightSource:
             state,
             goal=progress.goal,
             goals=progress.goals,
-            distance_m=progress.distance_m,
+            said={"goal_distance": self._distance_m(robot, goal), **self.reports.columns(robot)},
             speed_mps=speed_mps,
             gap_m=sample[0],
             recoveries=self.reports.recoveries.get(robot, (0, self.trees.recoveries(robot))),
@@ -272,6 +277,11 @@ class FlightSource:
             lidar=self.health.has_lidar(robot),
             reason=lost or reason,
         )
+
+    def _distance_m(self, robot: int, goal: Optional[Mapping[str, Any]]) -> float:
+        """Return the distance to a goal; C++ move_base does not tell it."""
+        x_m, y_m = self.bodies.positions[robot].tolist()
+        return goal_distance_m(goal and Pose2D(goal["x"], goal["y"]), Pose2D(x_m, y_m))
 
     def _lost_reason(self, pose_age_s: float, silent_s: float) -> str:
         if silent_s > LOST_AFTER_S:

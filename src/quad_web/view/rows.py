@@ -12,10 +12,12 @@ from quad_nav.mission.goal import Goal
 from quad_nav.peers.right_of_way import Yield, YieldDecision
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Obstacle, Scene
+from quad_nav.topics.robot_topics import COLUMNS
 from quad_web.view.state import Item
 
 Floats = NDArray[np.float64]
 
+_NOTHING: Mapping[str, float] = {}
 HOVERS_BELOW_MPS = 0.03
 """A robot that is slower hovers."""
 
@@ -208,7 +210,7 @@ def status_row(
     *,
     goal: Optional[int] = None,
     goals: Optional[int] = None,
-    distance_m: float = math.nan,
+    said: Mapping[str, float] = _NOTHING,
     speed_mps: float = 0.0,
     gap_m: float = math.nan,
     recoveries: Sequence[int] = (0, 0),
@@ -223,7 +225,7 @@ def status_row(
         state: What it does, see ``robot_state``.
         goal: Number of the goal that it flies to, from 1; None without one.
         goals: Number of its goals, None if unknown.
-        distance_m: Distance to that goal; NaN without one.
+        said: Numbers of the topics in ``COLUMNS``, by their names.
         speed_mps: Its speed.
         gap_m: Gap to the nearest other robot; NaN without one.
         recoveries: Recovery behaviours that have run for this goal, and how many there are.
@@ -231,7 +233,8 @@ def status_row(
         lidar: Its LIDAR is on.
         reason: Why it is stopped, lost or without a plan, else "".
     """
-    optional = {"distance_m": distance_m, "speed_mps": speed_mps, "gap_m": gap_m, "age_s": age_s}
+    optional = {"speed_mps": speed_mps, "gap_m": gap_m, "age_s": age_s}
+    optional.update({topic.name: said.get(topic.name, math.nan) for topic in COLUMNS})
     return {
         "robot": robot,
         "state": state,

@@ -50,7 +50,10 @@ class PlanTopics:
         self._schedule = RobotTopicSchedule()
         self._of_robot = {
             topic.name: rospy.Publisher(
-                names(f"~{topic.name}"), get_message_class(topic.kind), queue_size=10, latch=True
+                names(f"~{topic.name}"),
+                get_message_class(topic.kind),
+                queue_size=10,
+                latch=topic.is_latched,
             )
             for topic in ROBOT_TOPICS
         }
@@ -69,7 +72,7 @@ class PlanTopics:
     def publish(self, tick: Tick, pose: Pose3D) -> None:
         """Publish the results of a tick; `pose` is the robot's in the global frame."""
         now = time_message(tick.now_s)
-        for topic, fields in self._schedule.pop(tick):
+        for topic, fields in self._schedule.pop(tick, pose.to_2d()):
             publisher = self._of_robot[topic.name]
             publisher.publish(stamped(publisher.data_class, fields, tick.now_s))
         if tick.command is not None:
