@@ -17,8 +17,8 @@ from quad_nav.recording import messages
 from quad_nav.recording.record_file import TopicWriter, create, stamp_at
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, Scene, Walls
 from quad_nav.topics.flight_info import FLIGHT_TOPIC, RobotInfo, simulation_info
-from quad_nav.topics.markers import CUBE, OBSTACLES_TOPIC, Marker
 from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event
+from quad_nav.topics.obstacle_poses import POSES_TOPIC
 
 SCENE = Scene(
     "room",
@@ -70,8 +70,8 @@ def write_flight(path: Path, scene: Scene = SCENE, cart_y_m: Optional[float] = N
             odometry = messages.odometry(pose, speed, (0.0, 0.0, 0.0), frames, stamp)
             write(f"/odom{robot}", time_s, odometry)
         if cart_y_m is not None and step % 10 == 0:
-            cart = Marker("map", "moving", 0, CUBE, (time_s, cart_y_m, 1.0), (1, 1, 1), (1,) * 4)
-            write(OBSTACLES_TOPIC, time_s, messages.marker_array([cart]))
+            cart = messages.pose_array(np.array([(time_s, cart_y_m, 0.0)]), stamp)
+            write(POSES_TOPIC, time_s, cart)
         if step % 5 == 0:
             ranges = np.array([1.0, np.inf, 2.0 + time_s], np.float32)
             scan = Scan(time_s, 0.0, math.pi / 2, 0.02, 60.0, ranges)

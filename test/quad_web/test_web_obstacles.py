@@ -10,14 +10,17 @@ import pytest
 
 rospy = pytest.importorskip("rospy")
 
+from quad import msg  # noqa: E402
+from std_msgs.msg import Header  # noqa: E402
+
 from quad_nav.costmap.tracks import Tracks  # noqa: E402
 from quad_nav.geometry import Pose3D, quaternion_from_yaw  # noqa: E402
-from quad_nav.ros.common.conversions import marker_array, replacing_markers  # noqa: E402
+from quad_nav.ros.common.conversions import pose_array_message  # noqa: E402
 from quad_nav.sim.motion import Motion, Walkers  # noqa: E402
 from quad_nav.sim.movers import Movers  # noqa: E402
 from quad_nav.sim.scene import Box, MovingObstacle, Scene, Walls  # noqa: E402
-from quad_nav.topics.markers import OBSTACLES_TOPIC, moving_markers, moving_poses  # noqa: E402
-from quad_nav.topics.tracked_obstacles import track_markers  # noqa: E402
+from quad_nav.topics.obstacle_poses import POSES_TOPIC  # noqa: E402
+from quad_nav.topics.tracked_obstacles import obstacle_fields  # noqa: E402
 from quad_web.ros.layers import TrackIntake  # noqa: E402
 from quad_web.ros.obstacles import Obstacles  # noqa: E402
 
@@ -51,7 +54,7 @@ class FakeFrames:
 
 def hear(obstacles: Obstacles, message) -> None:
     """Give it a message as rospy does, which has its bytes only."""
-    deliver(obstacles.topics(STREET)[OBSTACLES_TOPIC], message)
+    deliver(obstacles.topics(STREET)[POSES_TOPIC], message)
 
 
 def deliver(topic, message) -> None:
@@ -60,26 +63,17 @@ def deliver(topic, message) -> None:
     topic.callback(topic.message_type().deserialize(buffer.getvalue()))
 
 
-def test_markers_tell_the_poses_that_they_were_made_of():
-    movers = Movers(STREET, 1)
-    message = marker_array(moving_markers(movers, 2.5))
-    assert moving_poses(message.markers, 3) == pytest.approx(movers.poses(2.5))
-    missing = moving_poses(message.markers[:1], 3)
-    assert missing[0] == pytest.approx([2.0, 6.0, -3.0])  # a quarter of the way
-    assert np.isnan(missing[1:]).all()
-
-
 def test_nothing_is_subscribed_to_where_nothing_moves():
     obstacles = Obstacles()
     assert obstacles.topics(None) == obstacles.topics(EMPTY) == {}
-    assert list(obstacles.topics(STREET)) == [OBSTACLES_TOPIC]
+    assert list(obstacles.topics(STREET)) == [POSES_TOPIC]
 
 
 def test_the_item_is_put_once_for_each_move():
     obstacles, movers = Obstacles(), Movers(STREET, 1)
     assert obstacles.items(STREET) == obstacles.solids() == []
     for now_s, x_m in ((2.5, 2.0), (5.0, 3.0)):
-        message = marker_array(moving_markers(movers, now_s))
+        message = pose_array_message(movers.poses(now_s), now_s)
         hear(obstacles, message)
         (item,) = obstacles.items(STREET)
         assert item.arrays["poses"][0].tolist() == pytest.approx([x_m, 6.0, -3.0])
@@ -91,13 +85,17 @@ def test_the_item_is_put_once_for_each_move():
     assert len(obstacles.items(STREET)) == 1
 
 
-@pytest.mark.parametrize("number, x_m", [(3, 1.0), (-1, 1.0), (0, math.nan)])
-def test_markers_that_are_no_obstacles_are_dropped(number, x_m):
+@pytest.mark.parametrize("count, x_m", [(2, 1.0), (4, 1.0), (3, math.nan)])
+def test_poses_that_are_not_of_the_scene_are_dropped(count, x_m):
     obstacles = Obstacles()
-    message = marker_array(moving_markers(Movers(STREET, 1), 2.5))
-    message.markers[0].id, message.markers[0].pose.position.x = number, x_m
-    hear(obstacles, message)
+    hear(obstacles, pose_array_message(np.full((count, 3), x_m), 2.5))
     assert obstacles.items(STREET) == obstacles.solids() == []
+
+
+def message_of(tracks: Tracks, frame: str) -> msg.MovingObstacles:
+    fields = obstacle_fields(tracks)
+    each = {name: [msg.MovingObstacle(**one) for one in rows] for name, rows in fields.items()}
+    return msg.MovingObstacles(header=Header(frame_id=frame), **each)
 
 
 def test_tracks_are_shown_in_map_until_the_last_one_has_ended():
@@ -105,8 +103,8 @@ def test_tracks_are_shown_in_map_until_the_last_one_has_ended():
     frames = FakeFrames()
     tracked = TrackIntake(0, frames)
     ((name, topic),) = tracked.topics().items()
-    assert name == "/move_base0/moving_obstacles" and tracked.item() is None
-    shown = replacing_markers(track_markers(TRACKS, "odom0"))
+    assert name == "/move_base0/moving_obstacle_tracks" and tracked.item() is None
+    shown = message_of(TRACKS, "odom0")
     deliver(topic, shown)
     assert tracked.item() is None  # the transform of odom0 is not known yet
     frames.map_from_odom = Pose3D(2.0, 1.0, 0.0, quaternion_from_yaw(math.pi / 2))
@@ -116,15 +114,15 @@ def test_tracks_are_shown_in_map_until_the_last_one_has_ended():
     (row,) = item.arrays["rows"].tolist()
     assert row == pytest.approx([2.0, 2.0, 0.0, 0.5, 0.3, 0.0])
     assert tracked.item() is None
-    deliver(topic, replacing_markers([]))
+    deliver(topic, message_of(Tracks.none(4.0), "odom0"))
     assert tracked.item().arrays["rows"].shape == (0, 6)
 
 
 def test_tracks_that_are_nowhere_are_refused():
     tracked = TrackIntake(0, FakeFrames())
     (topic,) = tracked.topics().values()
-    message = replacing_markers(track_markers(TRACKS, "map"))
-    message.markers[1].scale.x = math.inf
+    message = message_of(TRACKS, "map")
+    message.obstacles[0].radius = math.inf
     deliver(topic, message)
-    with pytest.raises(ValueError, match="marker disc 7"):
+    with pytest.raises(ValueError, match="expected a disc"):
         tracked.item()

@@ -10,20 +10,17 @@ import threading
 import time
 from pathlib import Path
 
-import numpy as np
 import rospy
 import rostest
 from flight_case import FlightCase, pid_of
+from quad.msg import MovingObstacle, MovingObstacles
 from quad.msg import RightOfWay as RightOfWayMessage
-from visualization_msgs.msg import MarkerArray
+from std_msgs.msg import Header
 from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.sync.client import connect
 
-from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D
-from quad_nav.ros.common.conversions import marker_array
 from quad_nav.topics.right_of_way import Kind, RightOfWay
-from quad_nav.topics.tracked_obstacles import track_markers
 from quad_web.ros.actions import FlightActions
 from quad_web.ros.source import FlightSource
 from quad_web.view.actions import GoalChange
@@ -240,11 +237,10 @@ class Web(FlightCase):
 
     def show_a_track(self):
         """Publish a track as the navigator of robot 1 does where something moves."""
-        topic = rospy.Publisher("/move_base1/moving_obstacles", MarkerArray, queue_size=1)
+        name = "/move_base1/moving_obstacle_tracks"
+        topic = rospy.Publisher(name, MovingObstacles, queue_size=1)
         self.addCleanup(topic.unregister)
-        states, covariances = np.array([(3.0, 2.0, 0.5, 0.0)]), np.eye(4)[None]
-        tracks = Tracks(0.0, np.array([7]), states, covariances, np.array([0.3]), np.zeros(1))
-        message = marker_array(track_markers(tracks, "map"))
+        message = MovingObstacles(Header(frame_id="map"), [MovingObstacle(x=3.0, y=2.0)], [])
 
         def is_shown():  # once the node web is connected
             topic.publish(message)

@@ -86,6 +86,27 @@ def message_kind(name: str) -> str:
     return name.replace("/msg/", "/")
 
 
+def wanted_kinds(path: Path, reader: Reader, wanted: TopicFilter) -> Dict[int, str]:
+    """Return the types of the wanted connections of an open recording, by their numbers.
+
+    Raises:
+        InputError: One of our own types has another definition.
+    """
+    kinds: Dict[int, str] = {}
+    for connection in reader.connections:
+        kind = message_kind(connection.msgtype)
+        if wanted(connection.topic, kind):
+            if kind.startswith("quad/") and connection.digest != definition(kind)[1]:
+                raise InputError(
+                    [
+                        f"{path}: {connection.topic}: {kind} has another definition, expected"
+                        " that of this version; read it with the version that made it"
+                    ]
+                )
+            kinds[connection.id] = kind
+    return kinds
+
+
 _Raw = Tuple[str, str, int, bytes, float]
 
 
@@ -95,18 +116,7 @@ def _share(stamp_ns: int, start_ns: int, end_ns: int) -> float:
 
 def _read(path: Path, wanted: TopicFilter) -> Iterator[_Raw]:
     with Reader(path) as reader:
-        kinds: Dict[int, str] = {}
-        for connection in reader.connections:
-            kind = message_kind(connection.msgtype)
-            if wanted(connection.topic, kind):
-                if kind.startswith("quad/") and connection.digest != definition(kind)[1]:
-                    raise InputError(
-                        [
-                            f"{path}: {connection.topic}: {kind} has another definition, expected"
-                            " that of this version; read it with the version that made it"
-                        ]
-                    )
-                kinds[connection.id] = kind
+        kinds = wanted_kinds(path, reader, wanted)
         connections = [c for c in reader.connections if c.id in kinds]
         if connections:  # an empty list would mean all of them
             for connection, stamp_ns, data in reader.messages(connections):

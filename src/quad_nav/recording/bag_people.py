@@ -12,7 +12,12 @@ from quad_nav.errors import InputError
 from quad_nav.recording.bag_file import FlightClock, read_messages
 from quad_nav.sim.crowd_record import CrowdRecord
 from quad_nav.sim.scene import Scene
-from quad_nav.topics.markers import OBSTACLES_PERIOD_S, OBSTACLES_TOPIC, people_positions
+from quad_nav.topics.obstacle_poses import (
+    OBSTACLES_PERIOD_S,
+    POSES_KIND,
+    POSES_TOPIC,
+    people_positions,
+)
 
 _PERIOD_S = 1.5 * OBSTACLES_PERIOD_S  # at most, on a loaded machine
 
@@ -20,7 +25,7 @@ _PERIOD_S = 1.5 * OBSTACLES_PERIOD_S  # at most, on a loaded machine
 def read_people(
     path: Path, scene: Scene, clock: FlightClock, end_s: float
 ) -> Optional[CrowdRecord]:
-    """Read the places of people who react from ``/simulation/obstacles``; None without such people.
+    """Read the places of people who react from ``POSES_TOPIC``; None without such people.
 
     Args:
         path: The recording.
@@ -39,9 +44,9 @@ def read_people(
     positions: List[NDArray[np.float64]] = []
     for message in read_messages(path, _is_wanted):
         try:
-            positions.append(people_positions(message.content.markers, scene))
+            positions.append(people_positions(message.content.poses, scene))
         except ValueError as error:
-            raise InputError([f"{path}: {OBSTACLES_TOPIC}: {error}"]) from error
+            raise InputError([f"{path}: {POSES_TOPIC}: {error}"]) from error
         stamps_ns.append(message.stamp_ns)
     times_s = clock.times_s(np.array(stamps_ns, np.int64)).tolist()
     if times_s and 0.0 < end_s - times_s[-1] <= _PERIOD_S:
@@ -53,4 +58,4 @@ def read_people(
 
 
 def _is_wanted(topic: str, kind: str) -> bool:
-    return (topic, kind) == (OBSTACLES_TOPIC, "visualization_msgs/MarkerArray")
+    return (topic, kind) == (POSES_TOPIC, POSES_KIND)

@@ -148,6 +148,12 @@ def planar_pose(at: Pose2D, z_m: float = 0.0) -> Pose3D:
     return Pose3D(at.x_m, at.y_m, z_m, quaternion_from_yaw(at.yaw_rad))
 
 
+def pose_array(poses: NDArray[np.float64], stamp: int) -> Any:
+    """Build a ``geometry_msgs/PoseArray`` of poses (x_m, y_m, yaw_rad) in ``map``, shape (n, 3)."""
+    upright = [pose(Pose2D(*row).to_3d()) for row in poses.tolist()]
+    return message("geometry_msgs/PoseArray", header("map", stamp), upright)
+
+
 def stamped(kind: str, fields: Mapping[str, Any], stamp: int, frame: str = "map") -> Any:
     """Build a message of a type from its fields; its header, if it has one, gets the stamp."""
     made = _message_class(kind)

@@ -21,7 +21,13 @@ from quad_nav.recording.messages import plan_bytes
 from quad_nav.recording.record_file import TopicWriter, stamp_at
 from quad_nav.topics.publishing import CostmapSchedule
 from quad_nav.topics.robot_topics import RobotTopicSchedule
-from quad_nav.topics.tracked_obstacles import MARKERS_TOPIC, TrackSchedule, track_markers
+from quad_nav.topics.tracked_obstacles import (
+    MARKERS_TOPIC,
+    TRACKS_TOPIC,
+    TrackSchedule,
+    obstacle_fields,
+    track_markers,
+)
 
 _NO_PLAN = np.zeros((0, 3))
 
@@ -80,9 +86,18 @@ class NavigatorTopics:
 
     def _write_obstacles(self, now_s: float, stamp: int) -> None:
         tracks = self._tracks.pop(now_s, self._scan_filters.tracks(now_s))
-        if tracks is not None:
-            shown = track_markers(tracks, self._navigator.local_costmap.params.global_frame)
-            self._write(MARKERS_TOPIC, stamp, messages.marker_array(shown, replaces_all=True))
+        if tracks is None:
+            return
+        frame = self._navigator.local_costmap.params.global_frame
+        shown = track_markers(tracks, frame)
+        self._write(MARKERS_TOPIC, stamp, messages.marker_array(shown, replaces_all=True))
+        obstacles = {
+            name: [messages.stamped("quad/MovingObstacle", fields, stamp) for fields in each]
+            for name, each in obstacle_fields(tracks).items()
+        }
+        own = stamp_at(tracks.time_s) if len(tracks) else stamp
+        told = messages.stamped("quad/MovingObstacles", obstacles, own, frame)
+        self._write(TRACKS_TOPIC, stamp, told)
 
     def _write_plans(self, tick: Tick, stamp: int) -> None:
         """Write the plans; a failed search publishes an empty plan, which clears the display."""

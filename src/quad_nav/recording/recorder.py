@@ -25,8 +25,6 @@ from quad_nav.sim.robot_state import RobotState
 from quad_nav.topics.contacts import CONTACTS_TOPIC, contact_fields
 from quad_nav.topics.flight_info import FLIGHT_TOPIC, FlightInfo, mission_info, simulation_info
 from quad_nav.topics.markers import (
-    OBSTACLES_PERIOD_S,
-    OBSTACLES_TOPIC,
     goal_markers,
     moving_markers,
     number_markers,
@@ -34,6 +32,7 @@ from quad_nav.topics.markers import (
     scene_markers,
 )
 from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event
+from quad_nav.topics.obstacle_poses import OBSTACLES_PERIOD_S, OBSTACLES_TOPIC, POSES_TOPIC
 from quad_nav.topics.publishing import FlownPath
 
 _SIMULATOR, _SEQUENCER = "/simulator", "/sequencer"
@@ -158,6 +157,8 @@ class Recorder(FlightObserver):
             stamp = stamp_at(flight.now_s)
             shown = messages.marker_array(moving_markers(movers, flight.now_s), stamp=stamp)
             self._write(OBSTACLES_TOPIC, stamp, shown, _SIMULATOR)
+            poses = messages.pose_array(movers.poses(flight.now_s), stamp)
+            self._write(POSES_TOPIC, stamp, poses, _SIMULATOR)
 
     def _transforms(self, robot: int, map_from_base: Pose3D, stamp: int) -> List[Any]:
         odom, base, lidar = f"odom{robot}", f"base_link{robot}", f"Lidar{robot}"

@@ -8,10 +8,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from dataclasses import dataclass
-from typing import Any, Dict, List, Sequence, Tuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Dict, List, Sequence, Tuple
 
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.goal import Goal
@@ -85,53 +82,11 @@ def scene_markers(scene: Scene) -> List[Marker]:
     return [*walls, *obstacles, *_box_lists(listed)]
 
 
-OBSTACLES_TOPIC = "/simulation/obstacles"
-"""`MarkerArray` of what moves by itself, every `OBSTACLES_PERIOD_S`."""
-OBSTACLES_PERIOD_S = 0.1
-
-
 def moving_markers(movers: Movers, now_s: float) -> List[Marker]:
     """Return walkers and other moving obstacles where they are at a time, in `map`."""
     return [
         _solid(obstacle, "moving", k, _MOVING_RGBA) for k, obstacle in enumerate(movers.at(now_s))
     ]
-
-
-def moving_poses(markers: Sequence[Any], count: int) -> NDArray[np.float64]:
-    """Return what a message on ``OBSTACLES_TOPIC`` says, the inverse of ``moving_markers``.
-
-    Args:
-        markers: Of type `visualization_msgs/Marker`.
-        count: Number of moving obstacles.
-
-    Returns:
-        float64[count, 3], (x_m, y_m, yaw_rad) in `map`; NaN for obstacles without a marker.
-
-    Raises:
-        ValueError: A marker is not of such an obstacle, or is nowhere.
-    """
-    poses = np.full((count, 3), np.nan)
-    for marker in markers:
-        place, turn = marker.pose.position, marker.pose.orientation
-        if not 0 <= marker.id < count:
-            raise ValueError(f"marker {marker.id}; expected 0 to {count - 1}")
-        yaw_rad = 2.0 * math.atan2(turn.z, turn.w)  # they turn about z only
-        if not np.isfinite((place.x, place.y, yaw_rad)).all():
-            raise ValueError(f"marker {marker.id} at ({place.x}, {place.y}), yaw {yaw_rad}")
-        poses[marker.id] = place.x, place.y, yaw_rad
-    return poses
-
-
-def people_positions(markers: Sequence[Any], scene: Scene) -> NDArray[np.float64]:
-    """Return where a message on ``OBSTACLES_TOPIC`` says that a scene's people are.
-
-    Returns:
-        float64[n, 2], metres in `map`; NaN for people without a marker.
-
-    Raises:
-        ValueError: As ``moving_poses``.
-    """
-    return moving_poses(markers, len(scene.moving_shapes))[scene.walker_rows, :2]
 
 
 def quadcopter_markers(n_robots: int) -> List[Marker]:

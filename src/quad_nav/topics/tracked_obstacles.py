@@ -1,13 +1,13 @@
-"""Tracked moving obstacles as topics: markers for people, ``quad/MovingObstacles`` for programs.
+"""Tracked moving obstacles as topics: markers for RViz, ``quad/MovingObstacles`` for programs.
 
-The page in the browser shows the rows that ``rows_of_markers`` reads from the markers.
+The page in the browser shows the rows that ``rows_of_message`` reads.
 """
 
 from __future__ import annotations
 
 import math
 from enum import IntEnum
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +24,7 @@ SIGMAS = 2.0
 """Half axes of the ellipse of the position, in standard deviations."""
 
 MAX_ROWS = 1000
-"""Tracks and suspects that ``rows_of_markers`` takes: the page draws each of them."""
-
-_DISC, _VELOCITY = "disc", "velocity"
-_SUSPECT, _SUSPECT_VELOCITY = "suspect", "suspect velocity"
-_ARROWS_OF = {_DISC: _VELOCITY, _SUSPECT: _SUSPECT_VELOCITY}
+"""Tracks and suspects that ``rows_of_message`` takes: the page draws each of them."""
 
 _DISC_RGBA: Rgba = (0.95, 0.35, 0.10, 0.45)
 _HIDDEN_RGBA: Rgba = (0.95, 0.35, 0.10, 0.18)
@@ -93,8 +89,8 @@ def track_markers(tracks: Tracks, frame: str) -> List[Marker]:
         for marker in _markers(frame, number, state, covariance, radius_m, hidden_s > 0.0)
     ]
     for number, (*state, radius_m) in enumerate(tracks.suspects.tolist()):
-        disc = _disc(frame, _SUSPECT, number, state, radius_m, _SUSPECT_RGBA)
-        markers += [disc, *_arrows(frame, _SUSPECT_VELOCITY, number, state)]
+        disc = _disc(frame, "suspect", number, state, radius_m, _SUSPECT_RGBA)
+        markers += [disc, *_arrows(frame, "suspect velocity", number, state)]
     return markers
 
 
@@ -116,10 +112,10 @@ def _markers(
     text, name = (0.0, 0.0, _TEXT_M), str(number)
     top, above = (x_m, y_m, _HEIGHT_M), (x_m, y_m, _HEIGHT_M + _TEXT_M)
     return [
-        _disc(frame, _DISC, number, state, radius_m, rgba),
+        _disc(frame, "disc", number, state, radius_m, rgba),
         Marker(frame, "ellipse", number, CYLINDER, top, flat, (*_ELLIPSE_RGB, alpha), turn_rad),
         Marker(frame, "number", number, TEXT, above, text, _TEXT_RGBA, text=name),
-        *_arrows(frame, _VELOCITY, number, state),
+        *_arrows(frame, "velocity", number, state),
     ]
 
 
@@ -154,22 +150,31 @@ def ellipse(covariance: NDArray[np.float64]) -> Tuple[Tuple[float, float], float
     return axes, 0.5 * math.atan2(2.0 * xy, xx - yy)
 
 
-def obstacle_fields(tracks: Tracks) -> List[Dict[str, Any]]:
-    """Return the fields of a ``quad/MovingObstacle`` for each track; suspects have none."""
-    return [
-        {
-            "number": number % 2**32,
-            **dict(zip(("x", "y", "vx", "vy"), state)),
-            "radius": radius_m,
-            "covariance": covariance.ravel(),
-        }
-        for number, state, radius_m, covariance in zip(
-            tracks.numbers.tolist(),
-            tracks.states.tolist(),
-            tracks.radii_m.tolist(),
-            tracks.covariances,
-        )
-    ]
+def obstacle_fields(tracks: Tracks) -> Mapping[str, List[Dict[str, Any]]]:
+    """Return the fields of each ``quad/MovingObstacle``: of the tracks and of the suspects."""
+    known = zip(
+        tracks.numbers % 2**32,
+        tracks.states,
+        tracks.radii_m,
+        tracks.covariances.reshape(-1, 16),
+        tracks.unseen_s,
+    )
+    suspects = (
+        (number, row[:4], row[4], np.zeros(16), 0.0) for number, row in enumerate(tracks.suspects)
+    )
+    return {
+        name: [
+            {
+                "number": int(number),
+                **dict(zip(("x", "y", "vx", "vy"), state.tolist())),
+                "radius": float(radius_m),
+                "covariance": covariance,
+                "unseen": float(unseen_s),
+            }
+            for number, state, radius_m, covariance, unseen_s in obstacles
+        ]
+        for name, obstacles in (("obstacles", known), ("suspects", suspects))
+    }
 
 
 def track_rows(tracks: Tracks) -> NDArray[np.float64]:
@@ -187,43 +192,30 @@ def track_rows(tracks: Tracks) -> NDArray[np.float64]:
     return np.vstack((known, np.column_stack((tracks.suspects, kinds))))
 
 
-def rows_of_markers(markers: Sequence[Any]) -> Tuple[str, NDArray[np.float64]]:
-    """Return what a message on ``MARKERS_TOPIC`` says, the inverse of ``track_markers``.
-
-    Args:
-        markers: Of type `visualization_msgs/Marker`.
+def rows_of_message(message: Any) -> NDArray[np.float64]:
+    """Return what a ``quad/MovingObstacles`` of rospy or of a recording says.
 
     Returns:
-        The frame, "" if there is no track and no suspect, and rows as of ``track_rows``.
+        Rows as of ``track_rows``, in the message's frame.
 
     Raises:
-        ValueError: A marker is nowhere, has no size, or there are more than ``MAX_ROWS``.
+        ValueError: An obstacle is nowhere, has no size, or there are more than ``MAX_ROWS``.
     """
-    velocities = {(one.ns, one.id): _velocity(one) for one in markers if one.type == ARROW}
-    frame, rows = "", []
-    for marker in markers:
-        arrow = _ARROWS_OF.get(marker.ns)
-        if arrow is None:
-            continue
-        place, velocity = marker.pose.position, velocities.get((arrow, marker.id), (0.0, 0.0))
-        row = (place.x, place.y, *velocity, marker.scale.x / 2.0, _kind(marker))
-        if not (np.abs(row) <= MAX_MAGNITUDE).all() or marker.scale.x < 0.0:
-            raise ValueError(f"marker {marker.ns} {marker.id}: {row}; expected a disc in the world")
-        frame = marker.header.frame_id
-        rows.append(row)
-    if len(rows) > MAX_ROWS:
-        raise ValueError(f"{len(rows)} tracks and suspects; expected {MAX_ROWS} at most")
-    return frame, np.array(rows, np.float64).reshape(-1, 6)
+    count = len(message.obstacles) + len(message.suspects)
+    if count > MAX_ROWS:
+        raise ValueError(f"{count} tracks and suspects; expected {MAX_ROWS} at most")
+    rows = [
+        (one.x, one.y, one.vx, one.vy, one.radius, kind)
+        for one, kind in (
+            *((one, _kind(one)) for one in message.obstacles),
+            *((one, TrackKind.SUSPECT) for one in message.suspects),
+        )
+    ]
+    for row in rows:
+        if not (np.abs(row) <= MAX_MAGNITUDE).all() or row[4] < 0.0:
+            raise ValueError(f"obstacle {row}; expected a disc in the world")
+    return np.array(rows, np.float64).reshape(-1, 6)
 
 
-def _velocity(arrow: Any) -> Tuple[float, float]:
-    turn, speed_mps = arrow.pose.orientation, arrow.scale.x / _ARROW_S
-    turn_rad = 2.0 * math.atan2(turn.z, turn.w)  # it turns about z only
-    return speed_mps * math.cos(turn_rad), speed_mps * math.sin(turn_rad)
-
-
-def _kind(disc: Any) -> TrackKind:
-    if disc.ns == _SUSPECT:
-        return TrackKind.SUSPECT
-    is_pale = disc.color.a < 0.5 * (_DISC_RGBA[3] + _HIDDEN_RGBA[3])
-    return TrackKind.HIDDEN if is_pale else TrackKind.SEEN
+def _kind(track: Any) -> TrackKind:
+    return TrackKind.HIDDEN if track.unseen > 0.0 else TrackKind.SEEN

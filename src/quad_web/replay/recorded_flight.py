@@ -16,8 +16,8 @@ from quad_nav.geometry import Pose2D, Scan
 from quad_nav.recording.bag_file import Progress, no_progress
 from quad_nav.recording.bag_trace import read_recording
 from quad_nav.sim.lidar import base_from_lidar
-from quad_nav.topics.markers import OBSTACLES_TOPIC
-from quad_nav.topics.tracked_obstacles import MARKERS_TOPIC, rows_of_markers
+from quad_nav.topics.obstacle_poses import POSES_KIND, POSES_TOPIC
+from quad_nav.topics.tracked_obstacles import TRACKS_TOPIC, rows_of_message
 from quad_web.replay.recorded_costmaps import CostmapTrack
 from quad_web.replay.recorded_obstacles import ObstacleTrack
 from quad_web.replay.recorded_robot import (
@@ -51,7 +51,7 @@ _LAYERS = {
         "nav_msgs/OccupancyGrid",
     ),
     "local_costmap": (r"/move_base([0-9]{1,4})/local_costmap/costmap", "nav_msgs/OccupancyGrid"),
-    "track": (rf"/move_base([0-9]{{1,4}})/{MARKERS_TOPIC}", "visualization_msgs/MarkerArray"),
+    "track": (rf"/move_base([0-9]{{1,4}})/{TRACKS_TOPIC}", "quad/MovingObstacles"),
 }
 _PASSING = ("scan", "local_plan", "track")
 _UPDATES = r"/move_base[0-9]{1,4}/(global|local)_costmap/costmap_updates"
@@ -95,7 +95,7 @@ class RecordedFlight:
         clock, index = reader.clock, self._index
         self._times = {topic: clock.times_s(index.times_ns(topic)) for topic in index.kinds}
         self._topics = self._topics_by_layer()
-        obstacles_s = self._times.get(OBSTACLES_TOPIC)
+        obstacles_s = self._times.get(POSES_TOPIC)
         self._obstacles = ObstacleTrack(trace.scene, trace.seed, self._index, obstacles_s)
         self._costmaps: Dict[str, CostmapTrack] = {}
         self._has_time: Callable[[], bool] = lambda: True
@@ -261,13 +261,13 @@ class RecordedFlight:
         return line_item("local_plan", robot, frame.transform_points(points))
 
     def _track(self, robot: int, topic: str, number: int) -> Item:
-        markers = self._index.read(topic, number).content.markers
+        message = self._index.read(topic, number).content
         try:
-            frame, rows_of = rows_of_markers(markers)
+            rows_of = rows_of_message(message)
         except ValueError as error:
             raise InputError([f"{topic}: message {number}: {error}"]) from error
         at_s = float(self._times[topic][number])
-        return track_item(robot, rows_of, self._map_from(frame, robot, at_s))
+        return track_item(robot, rows_of, self._map_from(message.header.frame_id, robot, at_s))
 
     def _costmap(self, topic: str) -> CostmapTrack:
         if topic not in self._costmaps:
@@ -311,8 +311,8 @@ class RecordedFlight:
 
 
 def _is_wanted(topic: str, kind: str) -> bool:
-    if topic == OBSTACLES_TOPIC:
-        return kind == "visualization_msgs/MarkerArray"
+    if topic == POSES_TOPIC:
+        return kind == POSES_KIND
     if re.fullmatch(_UPDATES, topic):
         return kind == "map_msgs/OccupancyGridUpdate"
     return any(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from quad_nav.errors import InputError
 from quad_nav.sim.movers import Movers
 from quad_nav.sim.scene import Obstacle, Scene
-from quad_nav.topics.markers import OBSTACLES_TOPIC, moving_poses
+from quad_nav.topics.obstacle_poses import POSES_TOPIC, moving_poses
 from quad_web.replay.recording_index import RecordingIndex
 from quad_web.view.items import ObstacleItems, moving_solids
 from quad_web.view.state import Item
@@ -21,9 +21,9 @@ Floats = NDArray[np.float64]
 class ObstacleTrack:
     """Where the moving obstacles of a scene are.
 
-    As the recording has them on ``/simulation/obstacles``. Without that topic, and before its first
-    message, they are computed from scene and seed, which does not tell where people are who react
-    to quadcopters.
+    As the recording has them on ``POSES_TOPIC``. Without that topic, and before its first message,
+    they are computed from scene and seed, which does not tell where people are who react to
+    quadcopters.
     """
 
     def __init__(
@@ -66,11 +66,11 @@ class ObstacleTrack:
 
     def _recorded(self, number: int, count: int) -> Floats:
         if self._last[0] != number:
-            message = self._index.read(OBSTACLES_TOPIC, number).content
+            message = self._index.read(POSES_TOPIC, number).content
             try:
-                poses = moving_poses(message.markers, count)
+                poses = moving_poses(message.poses, count)
             except ValueError as error:
-                raise InputError([f"{OBSTACLES_TOPIC}: message {number}: {error}"]) from error
+                raise InputError([f"{POSES_TOPIC}: message {number}: {error}"]) from error
             self._last = number, poses
         return self._last[1]
 

@@ -147,8 +147,9 @@ class RobotTrack:
         leg, pose = self.leg(time_s), self.pose(time_s)
         goal = leg.pose if leg is not None and self.is_active(leg, time_s) else None
         said = {topic.name: self.said(topic.name, time_s) for topic in COLUMNS}
+        here = None if pose is None else pose.to_2d()
         known = {name: value for name, value in said.items() if value is not None}
-        return {**known, "goal_distance": goal_distance_m(goal, pose and pose.to_2d())}
+        return {**known, "goal_distance": goal_distance_m(goal, here)}
 
     def recoveries(self, time_s: float) -> Tuple[int, int]:
         """Return how many recovery behaviours began for the present goal, and how many exist."""

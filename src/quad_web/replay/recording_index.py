@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.rosbag1 import Reader, ReaderError
 
-from quad_nav.recording.bag_file import Message, TopicFilter, message_kind, recording_faults
+from quad_nav.recording.bag_file import Message, TopicFilter, recording_faults, wanted_kinds
 from quad_nav.recording.messages import decode
 
 _KEPT_BYTES = 64 * 2**20  # of unpacked chunks
@@ -40,10 +40,11 @@ class RecordingIndex:
         with recording_faults(path):
             self._reader = Reader(path)
             self._reader.open()
+            kinds = wanted_kinds(path, self._reader, wanted)
             for connection in self._reader.connections:
-                topic, kind = connection.topic, message_kind(connection.msgtype)
-                if wanted(topic, kind):
-                    self.kinds[topic] = kind
+                if connection.id in kinds:
+                    topic = connection.topic
+                    self.kinds[topic] = kinds[connection.id]
                     places.setdefault(topic, []).extend(self._reader.indexes[connection.id])
             self._reader.indexes.clear()  # large, and not needed any more
             self._places = {topic: _sorted(entries) for topic, entries in places.items()}

@@ -9,16 +9,16 @@ import numpy as np
 from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid, Path
 from numpy.typing import NDArray
+from quad.msg import MovingObstacles
 from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan
-from visualization_msgs.msg import MarkerArray
 
 from quad_nav.config.plugins import plugin_name
 from quad_nav.grid import GridSpec
 from quad_nav.ros.common.conversions import ScanMessage, scan_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.packed_messages import read_path
-from quad_nav.topics.tracked_obstacles import MARKERS_TOPIC, rows_of_markers
+from quad_nav.topics.tracked_obstacles import TRACKS_TOPIC, rows_of_message
 from quad_nav.topics.validation import grid_problem, path_problem, scan_problem
 from quad_web.ros.frames import Frames
 from quad_web.ros.intake import Newest, Topic, decoded, raw_type
@@ -105,10 +105,10 @@ class TrackIntake:
     """Tracks and suspects of a robot."""
 
     def __init__(self, robot: int, frames: Frames) -> None:
-        """Receive the markers of tracks and suspects."""
+        """Receive `moving_obstacle_tracks`."""
         self._robot, self._frames = robot, frames
-        self._name = f"/move_base{robot}/{MARKERS_TOPIC}"
-        self._newest = Newest(self._name, MarkerArray)
+        self._name = f"/move_base{robot}/{TRACKS_TOPIC}"
+        self._newest = Newest(self._name, MovingObstacles)
 
     def topics(self) -> Dict[str, Topic]:
         """Return the topic."""
@@ -119,8 +119,8 @@ class TrackIntake:
         message = self._newest.take()
         if message is None:
             return None
-        frame, rows = rows_of_markers(message.markers)
-        map_from_frame = self._frames.find(MAP, frame or MAP)
+        rows = rows_of_message(message)
+        map_from_frame = self._frames.find(MAP, message.header.frame_id)
         if map_from_frame is None:
             return None
         return track_item(self._robot, rows, map_from_frame.to_2d())

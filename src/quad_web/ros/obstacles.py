@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Dict, List, Optional
 
 import numpy as np
+from geometry_msgs.msg import PoseArray
 from numpy.typing import NDArray
-from visualization_msgs.msg import MarkerArray
 
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.sim.scene import Obstacle, Scene
-from quad_nav.topics.markers import OBSTACLES_TOPIC, moving_poses
+from quad_nav.topics.obstacle_poses import POSES_TOPIC, moving_poses
 from quad_web.ros.intake import Newest, Topic
 from quad_web.view.items import ObstacleItems, moving_solids
 from quad_web.view.state import Item
@@ -23,7 +23,7 @@ class Obstacles:
 
     def __init__(self) -> None:
         """Start without obstacles."""
-        self._newest = Newest(OBSTACLES_TOPIC, MarkerArray)
+        self._newest = Newest(POSES_TOPIC, PoseArray)
         self._items = ObstacleItems()
         self._scene: Optional[Scene] = None
         self._poses = _NO_POSES
@@ -39,7 +39,7 @@ class Obstacles:
         """Return the topic to subscribe to; none without moving obstacles in the scene."""
         if scene is None or not scene.moving_shapes:
             return {}
-        return {OBSTACLES_TOPIC: self._newest.topic}
+        return {POSES_TOPIC: self._newest.topic}
 
     def items(self, scene: Optional[Scene]) -> List[Item]:
         """Return the item if the obstacles of the scene have moved."""
@@ -49,9 +49,9 @@ class Obstacles:
             message = self._newest.take()
             if scene is None or message is None:
                 return []
-            self._poses = moving_poses(message.markers, len(scene.moving_shapes))
+            self._poses = moving_poses(message.poses, len(scene.moving_shapes))
         except ValueError as error:
-            self._warnings.warn(f"web: {OBSTACLES_TOPIC}: message dropped: {error}")
+            self._warnings.warn(f"web: {POSES_TOPIC}: message dropped: {error}")
             return []
         return self._items.items(scene, self._poses)
 

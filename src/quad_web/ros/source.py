@@ -280,8 +280,10 @@ class FlightSource:
 
     def _distance_m(self, robot: int, goal: Optional[Mapping[str, Any]]) -> float:
         """Return the distance to a goal; C++ move_base does not tell it."""
+        if goal is None:
+            return math.nan
         x_m, y_m = self.bodies.positions[robot].tolist()
-        return goal_distance_m(goal and Pose2D(goal["x"], goal["y"]), Pose2D(x_m, y_m))
+        return goal_distance_m(Pose2D(goal["x"], goal["y"]), Pose2D(x_m, y_m))
 
     def _lost_reason(self, pose_age_s: float, silent_s: float) -> str:
         if silent_s > LOST_AFTER_S:

@@ -22,7 +22,6 @@ from quad_nav.recording.recorder import Recorder
 from quad_nav.sim.contacts import Contact
 from quad_nav.topics.contacts import contact_fields
 from quad_nav.topics.flight_info import FlightInfo
-from quad_nav.topics.markers import CYLINDER, Marker
 from quad_nav.topics.mission_events import mission_event
 
 # Stamps are whole nanoseconds; yaws come from quaternions.
@@ -209,16 +208,16 @@ def test_a_person_who_is_not_in_the_scene_is_refused(tmp_path):
         "starts": [[1.0, 1.0, 0.0]],
         "walkers": {"count": 2, "reacting": True},
     }
-    third = Marker("map", "moving", 2, CYLINDER, (3.0, 3.0, 0.9), (0.5, 0.5, 1.8), (1, 0, 0, 1))
     path = bag(
         tmp_path / "odd.bag",
         ("/quad/flight", 1, messages.flight_info(FlightInfo(scene=scene))),
         ("/odom0", 10**9, odometry(10**9, 0.0)),
-        ("/simulation/obstacles", 10**9, messages.marker_array([third])),
+        ("/simulation/obstacle_poses", 10**9, messages.pose_array(np.zeros((3, 3)), 10**9)),
     )
     with pytest.raises(InputError) as error:
         read_trace(path)
-    assert error.value.problems == [f"{path}: /simulation/obstacles: marker 2; expected 0 to 1"]
+    (problem,) = error.value.problems
+    assert problem.startswith(f"{path}: /simulation/obstacle_poses: 3 poses; expected 2")
 
 
 def test_navfn_s_plan_published_twice_is_one(tmp_path):

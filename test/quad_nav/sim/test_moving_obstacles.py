@@ -24,7 +24,8 @@ from quad_nav.sim.movers import Movers
 from quad_nav.sim.scene import Box, Cylinder, MovingObstacle, Sphere
 from quad_nav.sim.simulation import Simulation
 from quad_nav.sim.simulation_params import STEPS_PER_S, SimulationParams
-from quad_nav.topics.markers import CYLINDER, OBSTACLES_TOPIC, moving_markers
+from quad_nav.topics.markers import CYLINDER, moving_markers
+from quad_nav.topics.obstacle_poses import POSES_TOPIC
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -159,12 +160,12 @@ def test_recordings_have_the_obstacles_and_reports_show_them(tmp_path):
     assert trace.scene == scene and trace.seed == 5
     clearance_m = np.nanmin(clearances_m(resampled_tracks(trace), trace))
     assert clearance_m == pytest.approx(summary.robots[0].min_clearance_m, abs=1e-6)
-    sent = list(read_messages(path, lambda topic, kind: topic == OBSTACLES_TOPIC))
+    sent = list(read_messages(path, lambda topic, kind: topic == POSES_TOPIC))
     assert len(sent) == 21
     movers = Movers(scene, 5)
     for k in (0, 7, 20):
         x_m, y_m, _ = movers.poses(0.1 * k)[0]
-        position = sent[k].content.markers[0].pose.position
+        position = sent[k].content.poses[0].position
         assert (position.x, position.y) == pytest.approx((x_m, y_m))
     figure = paths_picture(flown_paths(trace, resampled_tracks(trace), []))
     drawn = [patch.center for patch in figure.axes[0].patches if isinstance(patch, Circle)]

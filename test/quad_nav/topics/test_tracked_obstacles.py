@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from quad_nav.costmap.tracks import Tracks
-from quad_nav.recording.messages import marker_array
+from quad_nav.recording import messages
 from quad_nav.topics.markers import ARROW, CYLINDER
 from quad_nav.topics.tracked_obstacles import (
     TrackKind,
     TrackSchedule,
     ellipse,
     obstacle_fields,
-    rows_of_markers,
+    rows_of_message,
     track_markers,
     track_rows,
 )
@@ -81,7 +81,16 @@ def test_a_suspect_has_a_disc_of_another_colour_and_an_arrow_if_it_moves():
     assert arrow.yaw_rad == pytest.approx(math.pi)
 
 
-def test_markers_tell_the_rows_of_tracks_and_suspects():
+def message_of(tracks):
+    rows = {
+        name: [messages.stamped("quad/MovingObstacle", fields, 0) for fields in each]
+        for name, each in obstacle_fields(tracks).items()
+    }
+    message = messages.stamped("quad/MovingObstacles", rows, 0, "odom0")
+    return messages.decode(messages.encode(message), "quad/MovingObstacles")
+
+
+def test_messages_tell_the_rows_of_tracks_and_suspects():
     known = replace(TRACKS, suspects=SUSPECTS)
     expected = [
         (1.0, 2.0, 0.0, 1.5, 0.3, TrackKind.SEEN),
@@ -89,31 +98,34 @@ def test_markers_tell_the_rows_of_tracks_and_suspects():
         (1.0, 2.0, 0.0, 0.0, 0.25, TrackKind.SUSPECT),
         (3.0, 4.0, -0.8, 0.0, 0.3, TrackKind.SUSPECT),
     ]
+    message = message_of(known)
     assert track_rows(known).tolist() == [list(map(float, row)) for row in expected]
-    shown = marker_array(track_markers(known, "odom0"), replaces_all=True)
-    frame, rows = rows_of_markers(shown.markers)
-    assert frame == "odom0" and rows == pytest.approx(np.array(expected))
+    assert rows_of_message(message).tolist() == track_rows(known).tolist()
+    first, second = message.obstacles
+    assert (first.number, second.number, second.unseen) == (7, 9, 0.4)
+    assert first.covariance.tolist() == COVARIANCE.ravel().tolist()
 
 
-def test_markers_without_tracks_have_no_frame_and_no_rows():
-    frame, rows = rows_of_markers(marker_array([], replaces_all=True).markers)
-    assert (frame, rows.shape) == ("", (0, 6))
-    assert track_rows(Tracks.none(0.0)).shape == (0, 6)
+def test_no_tracks_are_no_rows():
+    none = Tracks.none(0.0)
+    assert rows_of_message(message_of(none)).shape == track_rows(none).shape == (0, 6)
 
 
-@pytest.mark.parametrize("x_m, diameter_m", [(math.nan, 0.6), (1e7, 0.6), (1.0, -0.6)])
-def test_a_marker_that_is_nowhere_or_has_no_size_is_refused(x_m, diameter_m):
-    shown = marker_array(track_markers(TRACKS, "map"))
-    shown.markers[0].pose.position.x, shown.markers[0].scale.x = x_m, diameter_m
-    with pytest.raises(ValueError, match="marker disc 7: .*; expected a disc in the world"):
-        rows_of_markers(shown.markers)
+@pytest.mark.parametrize("x_m, radius_m", [(math.nan, 0.3), (1e7, 0.3), (1.0, -0.3)])
+def test_an_obstacle_that_is_nowhere_or_has_no_size_is_refused(x_m, radius_m):
+    message = message_of(TRACKS)
+    message.obstacles[0].x, message.obstacles[0].radius = x_m, radius_m
+    with pytest.raises(ValueError, match="expected a disc in the world"):
+        rows_of_message(message)
 
 
-def test_more_markers_than_a_page_can_draw_are_refused():
-    shown = marker_array(track_markers(TRACKS, "map"))
-    assert len(rows_of_markers(shown.markers[:1] * 1000)[1]) == 1000
+def test_more_than_a_page_can_draw_are_refused():
+    message = message_of(TRACKS)
+    message.obstacles *= 500
+    assert len(rows_of_message(message)) == 1000
+    message.suspects.append(message.obstacles[0])
     with pytest.raises(ValueError, match="1001 tracks and suspects; expected 1000 at most"):
-        rows_of_markers(shown.markers[:1] * 1001)
+        rows_of_message(message)
 
 
 def test_the_ellipse_is_turned_to_its_larger_axis():
@@ -122,14 +134,6 @@ def test_the_ellipse_is_turned_to_its_larger_axis():
     turn = np.array([[cos, -sin], [sin, cos]])
     axes, direction_rad = ellipse(turn @ np.diag([9.0, 1.0]) @ turn.T)
     assert axes == pytest.approx((3.0, 1.0)) and direction_rad == pytest.approx(math.pi / 6)
-
-
-def test_the_messages_have_states_radii_numbers_and_covariances():
-    fields = [dict(one) for one in obstacle_fields(TRACKS)]
-    covariance = fields[0].pop("covariance")
-    assert fields[0] == {"number": 7, "x": 1.0, "y": 2.0, "vx": 0.0, "vy": 1.5, "radius": 0.3}
-    assert covariance.tolist() == COVARIANCE.ravel().tolist()
-    assert [one["number"] for one in fields] == [7, 9]
 
 
 def test_tracks_are_published_at_10_hz_and_once_more_when_they_end():

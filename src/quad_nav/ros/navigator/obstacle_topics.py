@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import rospy
 from quad.msg import MovingObstacle, MovingObstacles
-from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.costmap.scan_filter import ScanFilters
-from quad_nav.ros.common.conversions import replacing_markers, time_message
+from quad_nav.ros.common.conversions import replacing_markers
+from quad_nav.ros.common.own_messages import stamped
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.tracked_obstacles import (
     MARKERS_TOPIC,
@@ -42,6 +42,9 @@ class ObstacleTopics:
             shown = track_markers(tracks, frame)
             self._markers.publish(replacing_markers(shown))
         if self._obstacles.get_num_connections() > 0:
-            stamp = time_message(tracks.time_s if len(tracks) else now_s)
-            obstacles = [MovingObstacle(**fields) for fields in obstacle_fields(tracks)]
-            self._obstacles.publish(MovingObstacles(Header(0, stamp, frame), obstacles))
+            obstacles = {
+                name: [MovingObstacle(**fields) for fields in each]
+                for name, each in obstacle_fields(tracks).items()
+            }
+            stamp_s = tracks.time_s if len(tracks) else now_s
+            self._obstacles.publish(stamped(MovingObstacles, obstacles, stamp_s, frame))

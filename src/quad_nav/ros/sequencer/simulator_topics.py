@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Collection
 
 import rospy
+from geometry_msgs.msg import PoseArray
 from quad.msg import Contact as ContactMessage
-from visualization_msgs.msg import MarkerArray
 
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.sequencer.flight_record import FlightRecord
@@ -14,7 +14,7 @@ from quad_nav.scenario.rules import START_S
 from quad_nav.sim.crowd_record import CrowdRecord
 from quad_nav.sim.scene import Scene
 from quad_nav.topics.contacts import CONTACTS_TOPIC, contact_from_message
-from quad_nav.topics.markers import OBSTACLES_TOPIC, people_positions
+from quad_nav.topics.obstacle_poses import POSES_TOPIC, people_positions
 from quad_nav.topics.validation import MAX_LEAD_S
 
 
@@ -60,7 +60,7 @@ class ContactTopic:
 
 
 class PeopleTopic:
-    """Adds what ``/simulation/obstacles`` says to the record of people, for clearances."""
+    """Adds what ``/simulation/obstacle_poses`` says to the record of people, for clearances."""
 
     def __init__(
         self,
@@ -79,16 +79,14 @@ class PeopleTopic:
         """
         self._scene, self._people = scene, people
         self._record, self._warnings = record, warnings
-        self._topic = rospy.Subscriber(OBSTACLES_TOPIC, MarkerArray, self._add, queue_size=20)
+        self._topic = rospy.Subscriber(POSES_TOPIC, PoseArray, self._add, queue_size=20)
 
-    def _add(self, message: MarkerArray) -> None:
-        if not message.markers:
-            return
-        stamp_s, now_s = message.markers[0].header.stamp.to_sec(), rospy.get_time()
+    def _add(self, message: PoseArray) -> None:
+        stamp_s, now_s = message.header.stamp.to_sec(), rospy.get_time()
         try:
             if stamp_s > now_s + MAX_LEAD_S:
                 raise ValueError(f"stamp {stamp_s:.2f} s, /clock is at {now_s:.2f} s")
-            positions = people_positions(message.markers, self._scene)
+            positions = people_positions(message.poses, self._scene)
         except ValueError as error:
             name = self._topic.resolved_name
             self._warnings.warn(f"{name}: message dropped: {error}", kind=name)

@@ -7,6 +7,7 @@ from typing import List, Sequence
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseArray
 from nav_msgs.msg import OccupancyGrid
 from quad.msg import Contact as ContactMessage
 from quad.msg import FlightInfo
@@ -18,6 +19,7 @@ from quad_nav.ros.common.conversions import (
     ScanMessage,
     key_values,
     marker_array,
+    pose_array_message,
     scan_message,
     time_message,
 )
@@ -32,13 +34,12 @@ from quad_nav.sim.simulation_params import FASTEST_RATE
 from quad_nav.topics.contacts import CONTACTS_TOPIC
 from quad_nav.topics.flight_info import FLIGHT_TOPIC, RESET_TOPIC, simulation_info, text_values
 from quad_nav.topics.markers import (
-    OBSTACLES_PERIOD_S,
-    OBSTACLES_TOPIC,
     moving_markers,
     number_markers,
     quadcopter_markers,
     scene_markers,
 )
+from quad_nav.topics.obstacle_poses import OBSTACLES_PERIOD_S, OBSTACLES_TOPIC, POSES_TOPIC
 
 _LAGS_BELOW = 0.9
 """The simulation lags if it reaches less than this part of the requested rate."""
@@ -83,6 +84,7 @@ class SimulatorTopics:
             "/simulation/quadcopters", MarkerArray, queue_size=1, latch=True
         )
         self._obstacles = rospy.Publisher(OBSTACLES_TOPIC, MarkerArray, queue_size=1)
+        self._obstacle_poses = rospy.Publisher(POSES_TOPIC, PoseArray, queue_size=1)
         self._obstacles_s, self._obstacles_listeners = -math.inf, 0  # at the last message
         self._publish_flight_info()
         self._scene.publish(marker_array(scene_markers(simulation.scene)))
@@ -123,13 +125,16 @@ class SimulatorTopics:
         movers, now_s = self._simulation.movers, self._simulation.now_s
         if not movers:
             return
-        listeners = self._obstacles.get_num_connections()
+        publishers = self._obstacles, self._obstacle_poses
+        in_rviz, programs = (one.get_num_connections() for one in publishers)
+        listeners = in_rviz + programs
         is_due = abs(now_s - self._obstacles_s) >= OBSTACLES_PERIOD_S - 1e-6
         if is_due or listeners > self._obstacles_listeners:
             self._obstacles_s = now_s
-            if listeners:
-                shown = moving_markers(movers, now_s)
-                self._obstacles.publish(marker_array(shown, now_s))
+            if in_rviz:
+                self._obstacles.publish(marker_array(moving_markers(movers, now_s), now_s))
+            if programs:
+                self._obstacle_poses.publish(pose_array_message(movers.poses(now_s), now_s))
         self._obstacles_listeners = listeners
 
     def publish_scans(self) -> None:
