@@ -321,6 +321,6 @@ def test_state_is_the_first_that_is_true(expected, navigator, speed_mps, facts):
 
 def test_unknown_numbers_are_none():
     row = status_row(2, "idle", speed_mps=0.5, recoveries=(1, 4))
-    assert row["goal_distance"] is row["gap_m"] is row["goal"] is None
+    assert row.get("goal_distance") is row["gap_m"] is row["goal"] is None
     assert (row["speed_mps"], row["recoveries"]) == (0.5, [1, 4])
     assert flight_item("ros", "room", "running", 1.0, rate=math.inf).data["rate"] is None

@@ -193,11 +193,23 @@ class FlightItems:
         if actions.state == "ended":
             state, speed_mps = "done" if sequencer.done else "stopped", 0.0
             reason = reason or HAS_ENDED
-        goal, active, body = (
-            sequencer.index + 1,
-            sequencer.active_goal,
-            self._flight.states[view.robot],
+        return rows.status_row(
+            view.robot,
+            state,
+            goal=None if sequencer.done else sequencer.index + 1,
+            goals=len(sequencer.sequence.goals),
+            said=self._columns(view),
+            speed_mps=speed_mps,
+            gap_m=float(sample[0]),
+            recoveries=(view.recoveries_done, view.recoveries),
+            lidar=actions.lidars[view.robot],
+            reason=reason,
         )
+
+    def _columns(self, view: NavigatorView) -> Dict[str, float]:
+        """Return the numbers of the topics in ``COLUMNS``."""
+        body = self._flight.states[view.robot]
+        active = self._flight.robots[view.robot].sequencer.active_goal
         status = RobotStatus(
             view.state,
             view.decision,
@@ -206,18 +218,7 @@ class FlightItems:
             body.map_from_base.to_2d(),
             body.twist,
         )
-        return rows.status_row(
-            view.robot,
-            state,
-            goal=None if sequencer.done else goal,
-            goals=len(sequencer.sequence.goals),
-            said={topic.name: topic.fields(status)["data"] for topic in COLUMNS},
-            speed_mps=speed_mps,
-            gap_m=float(sample[0]),
-            recoveries=(view.recoveries_done, view.recoveries),
-            lidar=actions.lidars[view.robot],
-            reason=reason,
-        )
+        return {topic.name: topic.fields(status)["data"] for topic in COLUMNS}
 
     def _cells(self, views: Sequence[NavigatorView], robots: FrozenSet[int]) -> List[Item]:
         positions, scene = self._flight.states.poses[:, :2], self._flight.setup.scene

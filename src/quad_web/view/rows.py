@@ -12,7 +12,6 @@ from quad_nav.mission.goal import Goal
 from quad_nav.peers.right_of_way import Yield, YieldDecision
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Obstacle, Scene
-from quad_nav.topics.robot_topics import COLUMNS
 from quad_web.view.state import Item
 
 Floats = NDArray[np.float64]
@@ -223,25 +222,24 @@ def status_row(
     Args:
         robot: Number of the robot.
         state: What it does, see ``robot_state``.
-        goal: Number of the goal that it flies to, from 1; None without one.
+        goal: Number of the goal that it flies to, from 1.
         goals: Number of its goals, None if unknown.
         said: Numbers of the topics in ``COLUMNS``, by their names.
         speed_mps: Its speed.
-        gap_m: Gap to the nearest other robot; NaN without one.
+        gap_m: Gap to the nearest other robot.
         recoveries: Recovery behaviours that have run for this goal, and how many there are.
         age_s: Time since the last message of the robot.
         lidar: Its LIDAR is on.
         reason: Why it is stopped, lost or without a plan, else "".
     """
-    optional = {"speed_mps": speed_mps, "gap_m": gap_m, "age_s": age_s}
-    optional.update({topic.name: said.get(topic.name, math.nan) for topic in COLUMNS})
+    numbers = {"speed_mps": speed_mps, "gap_m": gap_m, "age_s": age_s, **said}
     return {
         "robot": robot,
         "state": state,
         "goal": goal,
         "goals": goals,
         "recoveries": list(recoveries),
-        **{name: _number(value) for name, value in optional.items()},
+        **{name: _number(value) for name, value in numbers.items()},
         "lidar": lidar,
         "reason": reason,
     }
