@@ -3,6 +3,5 @@
 Reading order: ``trace`` (a flight as arrays) and ``messages`` (ROS messages without ROS).
 Writing: ``record_file`` (the files), ``action_topics`` and ``navigator_topics`` (what a
 ``move_base`` publishes), ``recorder`` (a whole flight). Reading: ``bag_file`` (messages of a
-recording), ``bag_checks`` (validation), ``bag_robot`` (one robot), ``bag_people`` (people who
-react), ``bag_trace`` (the trace).
+recording), ``bag_robot`` (one robot), ``bag_trace`` (the trace).
 """

@@ -2,130 +2,97 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, List, Tuple
+from collections import defaultdict
+from typing import Any, DefaultDict, List, Tuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from quad_nav.geometry import Pose2D, Pose3D, yaw_from_quaternion
-from quad_nav.recording.bag_checks import checked_pose, require_finite
+from quad_nav.geometry import Pose3D, Twist2D, yaw_from_quaternion
 from quad_nav.recording.bag_file import Message
 from quad_nav.recording.messages import pose_from, stamp_ns
 from quad_nav.recording.trace import RobotTrace, goal_traces
 from quad_nav.topics.flight_info import RobotInfo
 from quad_nav.topics.mission_events import MissionEvent
 from quad_nav.topics.robot_topics import RobotTopic
+from quad_nav.topics.validation import path_problem, pose_problem, twist_problem
+
+
+def require(problem: str) -> None:
+    """Refuse a message that has a problem.
+
+    Raises:
+        ValueError: The problem is not empty.
+    """
+    if problem:
+        raise ValueError(problem)
 
 
 class BagRobot:
     """Collects messages and builds a ``RobotTrace``; times are the recording's until then.
 
+    Its methods raise ValueError for messages that are not valid.
+
     Attributes:
         map_from_odom: Last pose of the odometry frame in ``map``.
         odom_frame: Name of the odometry frame; "" if the recording has no transform of it.
+        moves: Rows of time, position, quaternion and velocity (vx, vy, vyaw).
+        events: Events of the sequencer.
     """
 
     def __init__(self) -> None:
         self.map_from_odom = Pose3D(0.0, 0.0, 0.0)
         self.odom_frame = ""
-        self._odom_frames: List[Tuple[float, Pose2D]] = []
-        self._said: Dict[str, List[Tuple[float, Any]]] = {}
-        self._moves: List[Tuple[float, ...]] = []
+        self.moves: List[Tuple[float, ...]] = []
+        self.events: List[MissionEvent] = []
         self._commands: List[Tuple[float, float, float, float]] = []
         self._cycles: List[float] = []
-        self._plans: List[Tuple[float, NDArray[np.float64]]] = []
-        self._recoveries: List[Tuple[float, str]] = []
-        self._events: List[MissionEvent] = []
-
-    @property
-    def has_odometry(self) -> bool:
-        """True if any odometry was added."""
-        return bool(self._moves)
-
-    @property
-    def first_s(self) -> float:
-        """Time of the first odometry."""
-        return self._moves[0][0]
-
-    @property
-    def last_s(self) -> float:
-        """Time of the last odometry."""
-        return self._moves[-1][0]
+        # (time, value) pairs by what they are, also the topics of ``ROBOT_TOPICS``.
+        self._pairs: DefaultDict[str, List[Tuple[float, Any]]] = defaultdict(list)
 
     def set_odom_frame(self, time_s: float, frame: str, map_from_odom: Pose3D) -> None:
         """Place the odometry frame in ``map`` from a time on."""
+        require(pose_problem(map_from_odom))
         if not self.odom_frame or map_from_odom != self.map_from_odom:
-            self._odom_frames.append((time_s, map_from_odom.to_2d()))
+            self._pairs["odom_frames"].append((time_s, map_from_odom.to_2d()))
         self.odom_frame, self.map_from_odom = frame, map_from_odom
 
     def add_said(self, message: Message, topic: RobotTopic) -> None:
-        """Add what the navigator says on a topic; what is unknown here is skipped.
-
-        Raises:
-            ValueError: The message is not valid.
-        """
+        """Add what the navigator says on a topic; what is unknown here is skipped."""
         value = topic.read(message.content)
         if value is not None:
-            self._said.setdefault(topic.name, []).append((message.stamp_ns / 1e9, value))
+            self._pairs[topic.name].append((message.stamp_ns / 1e9, value))
 
     def add_odometry(self, message: Message) -> None:
-        """Add a ``nav_msgs/Odometry``.
-
-        Raises:
-            ValueError: The pose or the velocity is invalid.
-        """
+        """Add a ``nav_msgs/Odometry``."""
         odometry = message.content
         time_s = _seconds(odometry.header)
-        if self._moves and time_s <= self._moves[-1][0]:
+        if self.moves and time_s <= self.moves[-1][0]:
             return  # a paused simulation repeats its odometry
-        pose = self.map_from_odom.compose(
-            checked_pose(pose_from(odometry.pose.pose.position, odometry.pose.pose.orientation))
-        )
-        twist = odometry.twist.twist
-        require_finite((twist.linear.x, twist.linear.y, twist.angular.z))
-        self._moves.append(
-            (
-                time_s,
-                pose.x_m,
-                pose.y_m,
-                pose.z_m,
-                *pose.quaternion,
-                twist.linear.x,
-                twist.linear.y,
-                twist.angular.z,
-            )
-        )
+        pose = pose_from(odometry.pose.pose.position, odometry.pose.pose.orientation)
+        require(pose_problem(pose))
+        pose = self.map_from_odom.compose(pose)
+        place = (pose.x_m, pose.y_m, pose.z_m, *pose.quaternion)
+        self.moves.append((time_s, *place, *_planar(odometry.twist.twist)))
 
     def add_command(self, message: Message) -> None:
-        """Add a velocity command.
-
-        Raises:
-            ValueError: The command is not finite.
-        """
-        twist = message.content
-        require_finite((twist.linear.x, twist.linear.y, twist.angular.z))
-        self._commands.append(
-            (message.stamp_ns / 1e9, twist.linear.x, twist.linear.y, twist.angular.z)
-        )
+        """Add a velocity command."""
+        self._commands.append((message.stamp_ns / 1e9, *_planar(message.content)))
 
     def add_plan(self, message: Message) -> None:
         """Add a plan; an empty one removes an earlier plan with the same stamp.
 
         C++ move_base publishes NavFn's plan twice; the second one includes the goal and
         replaces the first.
-
-        Raises:
-            ValueError: The plan is not finite.
         """
-        time_s, poses = _seconds(message.content.header), message.content.poses
-        if self._plans and self._plans[-1][0] == time_s:
-            self._plans.pop()
+        time_s, poses, plans = _seconds(message.content.header), message.content.poses, "plans"
+        if self._pairs[plans] and self._pairs[plans][-1][0] == time_s:
+            self._pairs[plans].pop()
         if poses:
-            plan = np.array([_planar(pose.pose) for pose in poses])
-            require_finite((float(np.abs(plan).max()),))
+            plan = np.array([_place(pose.pose) for pose in poses])
+            require(path_problem(plan))
             if message.content.header.frame_id.lstrip("/") == self.odom_frame:
                 plan = self.map_from_odom.to_2d().transform_poses(plan)
-            self._plans.append((time_s, plan))
+            self._pairs[plans].append((time_s, plan))
 
     def add_cycle(self, message: Message) -> None:
         """Add a control cycle, from the action's feedback."""
@@ -134,13 +101,8 @@ class BagRobot:
     def add_recovery(self, message: Message) -> None:
         """Add the start of a recovery behaviour."""
         status = message.content
-        self._recoveries.append(
-            (_seconds(status.pose_stamped.header), status.recovery_behavior_name)
-        )
-
-    def add_event(self, event: MissionEvent) -> None:
-        """Add an event of the sequencer."""
-        self._events.append(event)
+        start = _seconds(status.pose_stamped.header), status.recovery_behavior_name
+        self._pairs["recoveries"].append(start)
 
     def trace(self, start_s: float, info: RobotInfo) -> RobotTrace:
         """Build the trace.
@@ -149,12 +111,12 @@ class BagRobot:
             start_s: Start of the flight on the recording's clock.
             info: What ``/quad/flight`` says of the robot.
         """
-        moves = np.array(self._moves)
-        said = {
-            name: tuple((time_s - start_s, value) for time_s, value in values)
-            for name, values in self._said.items()
-        }
+        moves = np.array(self.moves)
         commands = np.array(self._commands).reshape(-1, 4)
+        pairs = {
+            name: tuple((time_s - start_s, value) for time_s, value in values)
+            for name, values in self._pairs.items()
+        }
         return RobotTrace(
             info.name,
             moves[:, 0] - start_s,
@@ -165,18 +127,23 @@ class BagRobot:
             commands[:, 1:],
             np.array(self._cycles) - start_s,
             np.zeros(0),
-            tuple((time_s - start_s, plan) for time_s, plan in self._plans),
-            said.get("state", ()),
-            tuple((time_s - start_s, name) for time_s, name in self._recoveries),
-            goal_traces(self._events, start_s),
-            info.parameters,
-            info.goals,
-            tuple((time_s - start_s, pose) for time_s, pose in self._odom_frames),
-            said,
+            goals=goal_traces(self.events, start_s),
+            parameters=info.parameters,
+            mission=info.goals,
+            **{name: pairs.pop(name, ()) for name in ("plans", "recoveries", "odom_frames")},
+            states=pairs.get("state", ()),
+            said=pairs,
         )
 
 
-def _planar(pose: Any) -> Tuple[float, float, float]:
+def _planar(twist: Any) -> Tuple[float, float, float]:
+    """Return (vx, vy, vyaw) of a ``geometry_msgs/Twist``."""
+    velocity = twist.linear.x, twist.linear.y, twist.angular.z
+    require(twist_problem(Twist2D(*velocity)))
+    return velocity
+
+
+def _place(pose: Any) -> Tuple[float, float, float]:
     q = pose.orientation
     return pose.position.x, pose.position.y, yaw_from_quaternion((q.x, q.y, q.z, q.w))
 

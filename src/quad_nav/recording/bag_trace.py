@@ -9,12 +9,14 @@ from __future__ import annotations
 import functools
 import re
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Callable, Dict, Iterator, List, Optional, Tuple
 
+import numpy as np
+
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import limit_memory
-from quad_nav.recording.bag_checks import checked_pose
 from quad_nav.recording.bag_file import (
     FlightClock,
     Message,
@@ -22,7 +24,6 @@ from quad_nav.recording.bag_file import (
     no_progress,
     read_messages,
 )
-from quad_nav.recording.bag_people import read_people
 from quad_nav.recording.bag_robot import BagRobot
 from quad_nav.recording.messages import pose_from, stamp_ns
 from quad_nav.recording.trace import FlightTrace
@@ -38,12 +39,19 @@ from quad_nav.topics.flight_info import (
     flight_info_from_message,
 )
 from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event_from_message
+from quad_nav.topics.obstacle_poses import (
+    OBSTACLES_PERIOD_S,
+    POSES_KIND,
+    POSES_TOPIC,
+    people_positions,
+)
 from quad_nav.topics.robot_topics import ROBOT_TOPICS
 
 MAX_MEMORY_BYTES = 4 * 10**9
 """Limit for reading a recording: unpacked, it may be a thousand times larger."""
 LONGEST_FLIGHT_S = 30 * 24 * 3600.0
 """Longer flights are refused: two clocks in one recording differ by decades."""
+_LAST_PLACES_S = 1.5 * OBSTACLES_PERIOD_S  # at most, on a loaded machine
 _NODE = r"/move_base([0-9]{1,4})"
 # Topic, type, and what adds its messages.
 _ROBOT_TOPICS: Tuple[Tuple[str, str, Callable[[BagRobot, Message], None]], ...] = (
@@ -197,7 +205,7 @@ class TraceReader:
         """Add an event of ``/quad/events``."""
         time_s = stamp_ns(message.content.header.stamp) / 1e9
         event = mission_event_from_message(message.content, time_s)
-        self._robot(event.robot).add_event(event)
+        self._robot(event.robot).events.append(event)
 
     def add_contact(self, message: Message) -> None:
         """Add a contact."""
@@ -210,9 +218,7 @@ class TraceReader:
             number = _odom_number(transform.child_frame_id)
             if number is not None and transform.header.frame_id.lstrip("/") == "map":
                 robot = self._robot(number)
-                pose = checked_pose(
-                    pose_from(transform.transform.translation, transform.transform.rotation)
-                )
+                pose = pose_from(transform.transform.translation, transform.transform.rotation)
                 time_s = stamp_ns(transform.header.stamp) / 1e9
                 robot.set_odom_frame(time_s, transform.child_frame_id.lstrip("/"), pose)
 
@@ -224,16 +230,14 @@ class TraceReader:
         """
         info = self.info
         scene = info.read_scene(f"{path}: {FLIGHT_TOPIC}")
-        robots = self._flown_robots(path)
+        self._check_times(path)
         start_s = self.start_s
         infos = dict(enumerate(info.robots))
         traces = tuple(
             robot.trace(start_s, infos.get(number, RobotInfo(f"quad{number}")))
-            for number, robot in robots.items()
+            for number, robot in self.flown_robots.items()
         )
-        contacts = tuple(
-            Contact(c.time_s - start_s, c.robot, c.other, c.x_m, c.y_m) for c in self.contacts
-        )
+        contacts = tuple(replace(one, time_s=one.time_s - start_s) for one in self.contacts)
         return FlightTrace(
             info.title or path.stem,
             traces,
@@ -251,27 +255,28 @@ class TraceReader:
     @property
     def start_s(self) -> float:
         """Start of the flight on the recording's clock; there must be odometry."""
-        firsts_s = (robot.first_s for robot in self.robots.values() if robot.has_odometry)
+        firsts_s = (robot.moves[0][0] for robot in self.flown_robots.values())
         return min(firsts_s) if self.info.start_s is None else self.info.start_s
 
-    def _flown_robots(self, path: Path) -> Dict[int, BagRobot]:
-        """Return the robots with odometry, by number, after a check of their times."""
-        robots = {
-            number: robot for number, robot in sorted(self.robots.items()) if robot.has_odometry
-        }
-        if not robots:
+    @property
+    def flown_robots(self) -> Dict[int, BagRobot]:
+        """The robots with odometry, by number."""
+        return {number: robot for number, robot in sorted(self.robots.items()) if robot.moves}
+
+    def _check_times(self, path: Path) -> None:
+        if not self.flown_robots:
             raise InputError(
                 [f"{path}: no odometry; expected messages nav_msgs/Odometry on /odom0, ..."]
             )
-        for number, robot in robots.items():
-            if robot.last_s - robot.first_s > LONGEST_FLIGHT_S:
+        for number, robot in self.flown_robots.items():
+            length_s = robot.moves[-1][0] - robot.moves[0][0]
+            if length_s > LONGEST_FLIGHT_S:
                 raise InputError(
                     [
-                        f"{path}: /odom{number}: {robot.last_s - robot.first_s:g} s from "
-                        f"first to last, expected {LONGEST_FLIGHT_S:g} s at most"
+                        f"{path}: /odom{number}: {length_s:g} s from first to last, expected"
+                        f" {LONGEST_FLIGHT_S:g} s at most"
                     ]
                 )
-        return robots
 
     @property
     def clock(self) -> FlightClock:
@@ -279,10 +284,29 @@ class TraceReader:
         return FlightClock(self.clocks_ns, self.start_s)
 
     def _people(self, path: Path, scene: Optional[Scene], end_s: float) -> Optional[CrowdRecord]:
-        if scene is None:
+        """Read where people were who react; None without such people.
+
+        Up to the last pose of a robot they stand where they were seen last, if that was in the
+        topic's last period.
+        """
+        record = None if scene is None else CrowdRecord.of(scene)
+        if scene is None or record is None:
             return None
+        stamps_ns, places = [], []
         with _limited_memory(path):
-            return read_people(path, scene, self.clock, end_s)
+            for message in read_messages(path, lambda *topic: topic == (POSES_TOPIC, POSES_KIND)):
+                try:
+                    places.append(people_positions(message.content.poses, scene))
+                except ValueError as error:
+                    raise InputError([f"{path}: {POSES_TOPIC}: {error}"]) from error
+                stamps_ns.append(message.stamp_ns)
+        times_s = self.clock.times_s(np.array(stamps_ns, np.int64)).tolist()
+        if times_s and 0.0 < end_s - times_s[-1] <= _LAST_PLACES_S:
+            times_s.append(end_s)
+            places.append(places[-1])
+        for time_s, positions in zip(times_s, places):
+            record.add(time_s, positions)
+        return record
 
 
 _COMMON_TOPICS: Dict[Tuple[str, str], Callable[[TraceReader, Message], None]] = {

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.grid import GridSpec
-from quad_nav.recording.bag_checks import LARGEST_M
+from quad_nav.topics.validation import MAX_MAGNITUDE
 from quad_web.replay.recording_index import RecordingIndex
 
 _KEYFRAME_EVERY = 40  # updates
@@ -91,7 +91,7 @@ class CostmapTrack:
         numbers = (float(info.resolution), position.x, position.y)
         if rows * columns != len(grid.data) or not 0 < rows * columns <= MAX_CELLS:
             return None
-        if not all(abs(number) <= LARGEST_M for number in numbers) or numbers[0] <= 0.0:
+        if not all(abs(number) <= MAX_MAGNITUDE for number in numbers) or numbers[0] <= 0.0:
             return None
         costs = self._costs(place, np.asarray(grid.data, np.int8).reshape(rows, columns), has_time)
         if costs is None:

@@ -87,8 +87,7 @@ class RecordedFlight:
         self._index = RecordingIndex(path, _is_wanted)
         self.title, self.end_reason = path.name, trace.reason
         self.names = [robot.name for robot in trace.robots]
-        numbers = sorted(number for number, one in reader.robots.items() if one.has_odometry)
-        self._rows = {number: row for row, number in enumerate(numbers)}
+        self._rows = {number: row for row, number in enumerate(reader.flown_robots)}
         self._tracks = [RobotTrack(robot) for robot in trace.robots]
         self.start_s = min(float(robot.times_s[0]) for robot in trace.robots)
         self.end_s = max(float(robot.times_s[-1]) for robot in trace.robots)

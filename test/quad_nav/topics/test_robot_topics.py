@@ -82,4 +82,4 @@ def test_a_number_is_published_at_its_rate_and_nan_without_a_goal() -> None:
     assert math.isnan(said["goal_distance"].pop(0))
     assert said["goal_distance"] == {2: 1.0, 4: 2.0, 6: 3.0, 8: 4.0}
     again = [topic.name for topic, _ in schedule.pop(Tick(1.0), pose)]  # the clock was reset
-    assert again == ["goal_distance"]
+    assert "goal_distance" in again
