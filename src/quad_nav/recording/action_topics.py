@@ -34,8 +34,7 @@ class _Goal:
     ended_s: Optional[float] = None
 
     def message(self) -> Any:
-        goal_id = message("actionlib_msgs/GoalID", time(self.sent), self.name)
-        return message(_STATUS, goal_id, self.status, self.text)
+        return message(_STATUS, (time(self.sent), self.name), self.status, self.text)
 
 
 class ActionTopics:
@@ -66,17 +65,7 @@ class ActionTopics:
         goal = pose_stamped(planar_pose(pose), "map", stamp)
         self._topics.write(f"/move_base_simple/goal{self._robot}", stamp, goal, "/sequencer")
         # As quad's node forwards it: the action server assigns the id on arrival.
-        no_id = message("actionlib_msgs/GoalID", time(0), "")
-        self._write(
-            "goal",
-            stamp,
-            message(
-                "move_base_msgs/MoveBaseActionGoal",
-                header("", stamp),
-                no_id,
-                message("move_base_msgs/MoveBaseGoal", goal),
-            ),
-        )
+        self._write("goal", now_s, "move_base_msgs/MoveBaseActionGoal", (time(0), ""), (goal,))
 
     def accept(self, now_s: float) -> None:
         """Accept the waiting goal; the active goal, if any, is preempted."""
@@ -86,29 +75,17 @@ class ActionTopics:
         goal, self._waiting = self._waiting, None
         self._active = goal
         self._goals.append(goal)
-        self._write(
-            "current_goal", stamp_at(now_s), pose_stamped(planar_pose(goal.pose), "map", goal.sent)
-        )
+        pose = pose_stamped(planar_pose(goal.pose), "map", goal.sent)
+        self._topics.write(f"{self._node}/current_goal", stamp_at(now_s), pose, self._node)
         self._write_status(now_s)
 
     def feedback(self, now_s: float, pose: Pose2D) -> None:
         """Write the feedback of a control cycle at ``pose`` in the global costmap's frame."""
         if self._active is None:
             return
-        stamp = stamp_at(now_s)
-        self._write(
-            "feedback",
-            stamp,
-            message(
-                "move_base_msgs/MoveBaseActionFeedback",
-                header("", stamp),
-                self._active.message(),
-                message(
-                    "move_base_msgs/MoveBaseFeedback",
-                    pose_stamped(planar_pose(pose), self._global_frame, stamp),
-                ),
-            ),
-        )
+        here = pose_stamped(planar_pose(pose), self._global_frame, stamp_at(now_s))
+        kind = "move_base_msgs/MoveBaseActionFeedback"
+        self._write("feedback", now_s, kind, self._active.message(), (here,))
 
     def finish(self, now_s: float, outcome: Outcome) -> None:
         """Write the result of the active goal."""
@@ -124,17 +101,7 @@ class ActionTopics:
         goal, self._active = self._active, None
         assert goal is not None
         goal.status, goal.text, goal.ended_s = status, text, now_s
-        stamp = stamp_at(now_s)
-        self._write(
-            "result",
-            stamp,
-            message(
-                "move_base_msgs/MoveBaseActionResult",
-                header("", stamp),
-                goal.message(),
-                message("move_base_msgs/MoveBaseResult"),
-            ),
-        )
+        self._write("result", now_s, "move_base_msgs/MoveBaseActionResult", goal.message(), ())
         self._write_status(now_s)
 
     def _write_status(self, now_s: float) -> None:
@@ -144,16 +111,11 @@ class ActionTopics:
             for goal in self._goals
             if goal.ended_s is None or now_s < goal.ended_s + ENDED_GOALS_STAY_S
         ]
-        stamp = stamp_at(now_s)
-        self._write(
-            "status",
-            stamp,
-            message(
-                "actionlib_msgs/GoalStatusArray",
-                header("", stamp),
-                [goal.message() for goal in self._goals],
-            ),
-        )
+        shown = [goal.message() for goal in self._goals]
+        self._write("status", now_s, "actionlib_msgs/GoalStatusArray", shown)
 
-    def _write(self, name: str, stamp: int, content: Any) -> None:
+    def _write(self, name: str, now_s: float, kind: str, *fields: Any) -> None:
+        """Write a message of the action, whose header has the time and no frame."""
+        stamp = stamp_at(now_s)
+        content = message(kind, header("", stamp), *fields)
         self._topics.write(f"{self._node}/{name}", stamp, content, self._node)

@@ -1,18 +1,18 @@
 """Encode and decode ROS 1 messages without ROS.
 
 ``rosbags`` knows the common message types; our own are read from ``msg/``, and those of navigation
-are added here. A message is
-one of its dataclasses with the fields in the order of the definition, for example
+are added here. A message is one of its dataclasses, for example
 ``message("geometry_msgs/Point", x, y, z)``. Stamps are in nanoseconds.
 """
 
 from __future__ import annotations
 
 import functools
-from typing import Any, Dict, Iterable, List, Mapping, Sequence, Tuple
+from typing import Any, Dict, Iterable, Mapping, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
+from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from quad_nav.costmap.cost_grid import occupancy
@@ -75,13 +75,27 @@ def definition(kind: str) -> Tuple[str, str]:
 
 
 def message(kind: str, *fields: Any) -> Any:
-    """Build a message of a type, for example ``nav_msgs/Path``, from its fields in order."""
-    return _message_class(kind)(*fields)
+    """Build a message of a type, for example ``nav_msgs/Path``, from its fields in order.
+
+    A tuple stands for a message inside of it: that of its fields in order.
+    """
+    made, inner = _layout(kind)
+    return made(
+        *(
+            message(own, *value) if own and isinstance(value, tuple) else value
+            for own, value in zip(inner, fields)
+        )
+    )
 
 
 @functools.lru_cache(maxsize=None)
-def _message_class(kind: str) -> Any:
-    return _STORE.types[long_name(kind)]
+def _layout(kind: str) -> Tuple[Any, Tuple[str, ...]]:
+    """Return the class of a type, and the type of each field that is a message, else ""."""
+    name = long_name(kind)
+    fields = (field for _, field in _STORE.fielddefs[name][1])
+    return _STORE.types[name], tuple(
+        own.replace("/msg/", "/") if node == Nodetype.NAME else "" for node, own in fields
+    )
 
 
 def encode(content: Any) -> bytes:
@@ -103,44 +117,29 @@ def constant(kind: str, name: str) -> int:
     return int(getattr(_STORE.types[long_name(kind)], name))
 
 
-def time(stamp_ns: int) -> Any:
-    """Build a ROS time from nanoseconds."""
-    return message("builtin_interfaces/Time", stamp_ns // _NS, stamp_ns % _NS)
-
-
 def stamp_ns(stamp: Any) -> int:
     """Convert a ROS time to nanoseconds."""
     return int(stamp.sec) * _NS + int(stamp.nanosec)
 
 
-def header(frame: str, stamp: int) -> Any:
-    """Build a ``std_msgs/Header``."""
-    return message("std_msgs/Header", 0, time(stamp), frame)
+def time(stamp: int) -> Tuple[int, int]:
+    """Return the fields of a ROS time."""
+    return divmod(stamp, _NS)
 
 
-def point(x: float, y: float, z: float) -> Any:
-    """Build a ``geometry_msgs/Point``."""
-    return message("geometry_msgs/Point", x, y, z)
+def header(frame: str, stamp: int) -> Tuple[Any, ...]:
+    """Return the fields of a ``std_msgs/Header``."""
+    return 0, time(stamp), frame
 
 
-def vector(x: float, y: float, z: float) -> Any:
-    """Build a ``geometry_msgs/Vector3``."""
-    return message("geometry_msgs/Vector3", x, y, z)
-
-
-def quaternion(x: float, y: float, z: float, w: float) -> Any:
-    """Build a ``geometry_msgs/Quaternion``."""
-    return message("geometry_msgs/Quaternion", x, y, z, w)
-
-
-def pose(at: Pose3D) -> Any:
-    """Build a ``geometry_msgs/Pose``."""
-    return message("geometry_msgs/Pose", point(at.x_m, at.y_m, at.z_m), quaternion(*at.quaternion))
+def place(at: Pose3D) -> Tuple[Any, ...]:
+    """Return the fields of a ``geometry_msgs/Pose`` or ``geometry_msgs/Transform``."""
+    return (at.x_m, at.y_m, at.z_m), at.quaternion
 
 
 def pose_stamped(at: Pose3D, frame: str, stamp: int) -> Any:
     """Build a ``geometry_msgs/PoseStamped``."""
-    return message("geometry_msgs/PoseStamped", header(frame, stamp), pose(at))
+    return message("geometry_msgs/PoseStamped", header(frame, stamp), place(at))
 
 
 def planar_pose(at: Pose2D, z_m: float = 0.0) -> Pose3D:
@@ -150,28 +149,25 @@ def planar_pose(at: Pose2D, z_m: float = 0.0) -> Pose3D:
 
 def pose_array(poses: NDArray[np.float64], stamp: int) -> Any:
     """Build a ``geometry_msgs/PoseArray`` of poses (x_m, y_m, yaw_rad) in ``map``, shape (n, 3)."""
-    upright = [pose(Pose2D(*row).to_3d()) for row in poses.tolist()]
-    return message("geometry_msgs/PoseArray", header("map", stamp), upright)
+    upright = (place(planar_pose(Pose2D(*row))) for row in poses.tolist())
+    shown = [message("geometry_msgs/Pose", *one) for one in upright]
+    return message("geometry_msgs/PoseArray", header("map", stamp), shown)
 
 
 def stamped(kind: str, fields: Mapping[str, Any], stamp: int, frame: str = "map") -> Any:
     """Build a message of a type from its fields; its header, if it has one, gets the stamp."""
-    made = _message_class(kind)
+    made, _ = _layout(kind)
     if "header" in made.__dataclass_fields__:
-        return made(header=header(frame, stamp), **fields)
+        own = message("std_msgs/Header", *header(frame, stamp))
+        return made(header=own, **fields)
     return made(**fields)
 
 
 def flight_info(info: FlightInfo) -> Any:
     """Build a ``quad/FlightInfo``."""
     fields = info.fields
-    robots = [_message_class("quad/RobotInfo")(**robot) for robot in fields["robots"]]
-    return _message_class("quad/FlightInfo")(**{**fields, "robots": robots})
-
-
-def text(content: str) -> Any:
-    """Build a ``std_msgs/String``."""
-    return message("std_msgs/String", content)
+    robots = [stamped("quad/RobotInfo", robot, 0) for robot in fields["robots"]]
+    return stamped("quad/FlightInfo", {**fields, "robots": robots}, 0)
 
 
 def clock(stamp: int) -> Any:
@@ -181,25 +177,14 @@ def clock(stamp: int) -> Any:
 
 def transform(parent_from_child: Pose3D, parent: str, child: str, stamp: int) -> Any:
     """Build a ``geometry_msgs/TransformStamped``."""
-    at = parent_from_child
-    return message(
-        "geometry_msgs/TransformStamped",
-        header(parent, stamp),
-        child,
-        message(
-            "geometry_msgs/Transform", vector(at.x_m, at.y_m, at.z_m), quaternion(*at.quaternion)
-        ),
-    )
-
-
-def twist(linear: Sequence[float], angular: Sequence[float]) -> Any:
-    """Build a ``geometry_msgs/Twist`` from (x, y, z) in m/s and in rad/s."""
-    return message("geometry_msgs/Twist", vector(*linear), vector(*angular))
+    own = header(parent, stamp)
+    return message("geometry_msgs/TransformStamped", own, child, place(parent_from_child))
 
 
 def command(velocity: Twist2D) -> Any:
     """Build the ``geometry_msgs/Twist`` of a velocity command."""
-    return twist((velocity.vx_mps, velocity.vy_mps, 0.0), (0.0, 0.0, velocity.vyaw_radps))
+    linear = velocity.vx_mps, velocity.vy_mps, 0.0
+    return message("geometry_msgs/Twist", linear, (0.0, 0.0, velocity.vyaw_radps))
 
 
 def odometry(
@@ -218,12 +203,13 @@ def odometry(
         frames: Names of the odometry frame and of the body frame.
         stamp: Time in nanoseconds.
     """
+    twist = tuple(linear_mps), tuple(angular_radps)
     return message(
         "nav_msgs/Odometry",
         header(frames[0], stamp),
         frames[1],
-        message("geometry_msgs/PoseWithCovariance", pose(odom_from_base), _ZEROS_36),
-        message("geometry_msgs/TwistWithCovariance", twist(linear_mps, angular_radps), _ZEROS_36),
+        (place(odom_from_base), _ZEROS_36),
+        (twist, _ZEROS_36),
     )
 
 
@@ -246,50 +232,26 @@ def laser_scan(scan: Scan, frame: str, stamp: int) -> Any:
 
 
 def polygon(points: NDArray[np.float64], frame: str, stamp: int) -> Any:
-    """Build a ``geometry_msgs/PolygonStamped``.
-
-    Args:
-        points: Corners, shape (n, 2), metres in ``frame``.
-        frame: Frame of the corners.
-        stamp: Time in nanoseconds.
-    """
+    """Build a ``geometry_msgs/PolygonStamped`` from corners, shape (n, 2), metres in ``frame``."""
     corners = [message("geometry_msgs/Point32", x, y, 0.0) for x, y in points.tolist()]
-    return message(
-        "geometry_msgs/PolygonStamped",
-        header(frame, stamp),
-        message("geometry_msgs/Polygon", corners),
-    )
+    return message("geometry_msgs/PolygonStamped", header(frame, stamp), (corners,))
 
 
 def occupancy_grid(spec: GridSpec, costs: NDArray[np.uint8], frame: str, stamp: int) -> Any:
     """Build a ``nav_msgs/OccupancyGrid`` from costs, shape (size_y, size_x)."""
-    origin = pose(Pose3D(spec.origin_x_m, spec.origin_y_m, 0.0))
-    info = message(
-        "nav_msgs/MapMetaData", time(0), spec.resolution_m, spec.size_x, spec.size_y, origin
-    )
+    origin = place(Pose3D(spec.origin_x_m, spec.origin_y_m, 0.0))
+    info = time(0), spec.resolution_m, spec.size_x, spec.size_y, origin
     return message("nav_msgs/OccupancyGrid", header(frame, stamp), info, occupancy(costs).ravel())
 
 
 def grid_update(costs: NDArray[np.uint8], x0: int, y0: int, frame: str, stamp: int) -> Any:
-    """Build a ``map_msgs/OccupancyGridUpdate``.
+    """Build a ``map_msgs/OccupancyGridUpdate`` from costs of a window, shape (height, width).
 
-    Args:
-        costs: Costs of the window, shape (height, width).
-        x0: Column of the window's lower left cell in the costmap.
-        y0: Row of that cell.
-        frame: Frame of the costmap.
-        stamp: Time in nanoseconds.
+    Its lower left cell is that of column ``x0`` and row ``y0`` of the costmap.
     """
     height, width = costs.shape
-    return message(
-        "map_msgs/OccupancyGridUpdate",
-        header(frame, stamp),
-        x0,
-        y0,
-        width,
-        height,
-        occupancy(costs).ravel(),
-    )
+    window = x0, y0, width, height, occupancy(costs).ravel()
+    return message("map_msgs/OccupancyGridUpdate", header(frame, stamp), *window)
 
 
 def marker_array(shown: Sequence[Marker], replaces_all: bool = False, stamp: int = 0) -> Any:
@@ -300,34 +262,28 @@ def marker_array(shown: Sequence[Marker], replaces_all: bool = False, stamp: int
         replaces_all: Delete all markers of the topic first.
         stamp: Time of the markers, ns; 0 if they hold at any time.
     """
-    markers = [_marker(one, stamp) for one in shown]
+    markers = [_marker(one, "ADD", stamp) for one in shown]
     if replaces_all:
-        clear = _marker(
-            Marker("map", "", 0, 0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)),
-            stamp,
-        )
-        clear.action = constant("visualization_msgs/Marker", "DELETEALL")
-        markers.insert(0, clear)
+        nothing = Marker("map", "", 0, 0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
+        markers.insert(0, _marker(nothing, "DELETEALL", stamp))
     return message("visualization_msgs/MarkerArray", markers)
 
 
-def _marker(one: Marker, stamp: int) -> Any:
-    place = Pose3D(*one.place_m, quaternion_from_yaw(one.yaw_rad))
-    colours: List[Any] = []
+def _marker(one: Marker, action: str, stamp: int) -> Any:
     return message(
         "visualization_msgs/Marker",
         header(one.frame, stamp),
         one.namespace,
         one.number,
         one.kind,
-        constant("visualization_msgs/Marker", "ADD"),
-        pose(place),
-        vector(*one.size_m),
-        message("std_msgs/ColorRGBA", *one.rgba),
-        message("builtin_interfaces/Duration", 0, 0),
+        constant("visualization_msgs/Marker", action),
+        place(Pose3D(*one.place_m, quaternion_from_yaw(one.yaw_rad))),
+        one.size_m,
+        one.rgba,
+        time(0),
         one.frame_locked,
-        [point(*at) for at in one.points_m],
-        colours,
+        [message("geometry_msgs/Point", *at) for at in one.points_m],
+        [],
         one.text,
         "",
         False,
@@ -365,19 +321,15 @@ def plan_bytes(plan: NDArray[np.float64], frame: str, stamp: int) -> bytes:
     return _path(frame, stamp, len(plan), records.tobytes())
 
 
-def pose_bytes(pose: Pose3D, frame: str, stamp: int) -> bytes:
-    """Serialize one pose for ``path_bytes``."""
-    return encode(pose_stamped(pose, frame, stamp))
-
-
 def path_bytes(poses: Iterable[bytes], frame: str, stamp: int) -> bytes:
-    """Serialize poses from ``pose_bytes`` as ``nav_msgs/Path``."""
+    """Serialize ``nav_msgs/Path`` from its poses, serialized ``geometry_msgs/PoseStamped``."""
     parts = list(poses)
     return _path(frame, stamp, len(parts), b"".join(parts))
 
 
 def _path(frame: str, stamp: int, count: int, poses: bytes) -> bytes:
-    return encode(header(frame, stamp)) + count.to_bytes(4, "little") + poses
+    start = message("std_msgs/Header", *header(frame, stamp))
+    return encode(start) + count.to_bytes(4, "little") + poses
 
 
 @functools.lru_cache(maxsize=None)

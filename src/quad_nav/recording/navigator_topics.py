@@ -17,7 +17,6 @@ from quad_nav.loop.navigator_group import LoopRobot
 from quad_nav.navigator.tick import RecoveryStart, RobotPoses, Tick
 from quad_nav.recording import messages
 from quad_nav.recording.action_topics import ActionTopics
-from quad_nav.recording.messages import plan_bytes
 from quad_nav.recording.record_file import TopicWriter, stamp_at
 from quad_nav.topics.publishing import CostmapSchedule
 from quad_nav.topics.robot_topics import RobotTopicSchedule
@@ -122,7 +121,11 @@ class NavigatorTopics:
         self, name: str, plan: NDArray[np.float64], frame: str, stamp: int, own: int
     ) -> None:
         self._topics.write_bytes(
-            f"{self._node}/{name}", "nav_msgs/Path", stamp, plan_bytes(plan, frame, own), self._node
+            f"{self._node}/{name}",
+            "nav_msgs/Path",
+            stamp,
+            messages.plan_bytes(plan, frame, own),
+            self._node,
         )
 
     def _write_recovery(self, start: RecoveryStart, pose: Pose2D, stamp: int) -> None:

@@ -15,7 +15,6 @@ from quad_nav.mission.actions import Action, SendGoal
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.recording import messages
-from quad_nav.recording.messages import path_bytes, pose_bytes
 from quad_nav.recording.navigator_topics import NavigatorTopics
 from quad_nav.recording.record_file import START_NS, TopicWriter, create, stamp_at
 from quad_nav.sim.contacts import Contact
@@ -184,7 +183,7 @@ class Recorder(FlightObserver):
         """Write the whole path again if it has grown."""
         path, stamp = self._paths[robot], stamp_at(now_s)
         if path.add(now_s, state.map_from_base):
-            data = path_bytes(path.poses, "map", stamp)
+            data = messages.path_bytes(path.poses, "map", stamp)
             self._topics.write_bytes(
                 f"/path{robot}", "nav_msgs/Path", stamp, data, _SEQUENCER, True
             )
@@ -221,4 +220,4 @@ class Recorder(FlightObserver):
 
 def _path_pose(stamp_s: float, pose: Pose3D) -> bytes:
     upright = messages.planar_pose(pose.to_2d(), pose.z_m)
-    return pose_bytes(upright, "map", stamp_at(stamp_s))
+    return messages.encode(messages.pose_stamped(upright, "map", stamp_at(stamp_s)))

@@ -296,7 +296,9 @@ def test_an_invalid_message_is_named(tmp_path, topic, content):
 
 
 def test_a_recording_of_an_older_version_is_refused(tmp_path):
-    path = bag(tmp_path / "flight.bag", ("/quad/flight", 1, messages.text("{}")))
+    path = bag(
+        tmp_path / "flight.bag", ("/quad/flight", 1, messages.message("std_msgs/String", "{}"))
+    )
     with pytest.raises(InputError, match="/quad/flight: is std_msgs/String, as quad 0.2.0 rec"):
         read_trace(path)
 

@@ -15,7 +15,7 @@ from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly
 from quad_nav.recording import messages
 from quad_nav.recording.bag_file import read_messages
-from quad_nav.recording.messages import path_bytes, plan_bytes, pose_bytes
+from quad_nav.recording.messages import path_bytes, plan_bytes
 from quad_nav.recording.recorder import Recorder
 from quad_nav.topics.flight_info import FLIGHT_TOPIC, flight_info_from_message
 
@@ -222,7 +222,7 @@ def test_paths_have_the_bytes_of_their_messages(plan):
         [messages.pose_stamped(pose, "odom0", stamp) for pose in poses],
     )
     assert plan_bytes(plan, "odom0", stamp) == messages.encode(path)
-    parts = [pose_bytes(pose, "odom0", stamp) for pose in poses]
+    parts = [messages.encode(messages.pose_stamped(pose, "odom0", stamp)) for pose in poses]
     assert path_bytes(parts, "odom0", stamp) == messages.encode(path)
 
 
