@@ -32,43 +32,23 @@ def changed(one, **fields):
 
 
 @pytest.mark.parametrize(
-    "inputs, is_localized, level, message",
+    "odom_s, scan_s, is_localized, level, message",
     [
-        ([ODOM, SCAN], True, Level.OK, "all inputs arriving"),
-        ([ODOM, changed(SCAN, silent_s=None)], True, Level.STALE, "no message yet on /scan0"),
-        (
-            [changed(ODOM, silent_s=1.5), changed(SCAN, silent_s=1.5)],
-            True,
-            Level.ERROR,
-            "no message on /scan0 for 1.5 s",
-        ),
-        (
-            [changed(ODOM, silent_s=None), changed(SCAN, silent_s=1.04)],
-            True,
-            Level.ERROR,
-            "no message on /scan0 for 1.0 s",
-        ),
-        ([ODOM, changed(SCAN, silent_s=1.0)], True, Level.OK, "all inputs arriving"),
-        ([ODOM, SCAN], False, Level.ERROR, "robot pose unknown, check /tf"),
+        (0.02, 1.0, True, Level.OK, "all inputs arriving"),
+        (0.02, None, True, Level.STALE, "no message yet on /scan0"),
+        (1.5, 1.5, True, Level.ERROR, "no message on /scan0 for 1.5 s"),
+        (None, 1.04, True, Level.ERROR, "no message on /scan0 for 1.0 s"),
+        (0.02, 0.05, False, Level.ERROR, "robot pose unknown, check /tf"),
     ],
 )
-def test_inputs(inputs, is_localized, level, message):
+def test_inputs(odom_s, scan_s, is_localized, level, message):
+    inputs = [changed(ODOM, silent_s=odom_s), changed(SCAN, silent_s=scan_s)]
     health = inputs_health("move_base0", "quad0", inputs, is_localized)
     assert (health.name, health.hardware_id) == ("move_base0: inputs", "quad0")
     assert (health.level, health.message) == (level, message)
-
-
-def test_values_of_inputs():
-    values = inputs_health("move_base0", "quad0", [SCAN, changed(ODOM, silent_s=None)], True).values
-    assert values == {
-        "located": "True",
-        "/scan0 Hz": "10.0",
-        "/scan0 silent s": "0.05",
-        "/scan0 late s": "0.010",
-        "/odom0 Hz": "40.0",
-        "/odom0 silent s": "",
-        "/odom0 late s": "0.000",
-    }
+    silent = "" if odom_s is None else f"{odom_s:.2f}"
+    expected = {"located": str(is_localized), "/odom0 silent s": silent, "/scan0 late s": "0.010"}
+    assert {**health.values, **expected} == health.values
 
 
 @pytest.mark.parametrize(
@@ -77,27 +57,17 @@ def test_values_of_inputs():
         ({}, Level.OK, "controlling at 9.6 Hz"),
         ({"state": State.IDLE, "rate_hz": 0.0}, Level.OK, "idle"),
         ({"rate_hz": 4.0, "slow_seconds": 2}, Level.OK, "controlling at 4.0 Hz"),
-        (
-            {"rate_hz": 4.0, "slow_seconds": 3},
-            Level.WARN,
-            "controlling at 4.0 Hz, expected 10 Hz",
-        ),
+        ({"rate_hz": 4.0, "slow_seconds": 3}, Level.WARN, "controlling at 4.0 Hz, expected 10 Hz"),
         ({"state": State.CLEARING}, Level.WARN, "clearing at 9.6 Hz: recovery behaviour active"),
-        ({"fault": "no plan: blocked"}, Level.WARN, "controlling: no plan: blocked"),
         # The level does not depend on the wording.
         ({"fault": "stopping: said"}, Level.WARN, "controlling: stopping: said"),
-        (
-            {"fault": "stopping: no data from scan", "is_stopped": True},
-            Level.ERROR,
-            "controlling: stopping: no data from scan",
-        ),
+        ({"fault": "no data", "is_stopped": True}, Level.ERROR, "controlling: no data"),
     ],
 )
 def test_control(fields, level, message):
     health = control_health("move_base0", "quad0", changed(CONTROL, **fields))
     assert (health.level, health.message) == (level, message)
-    assert health.values["last reason"] == "no plan: the goal is off the map"
-    assert health.values["last reason at s"] == "12.50"
+    assert (health.values["last reason"], health.values["last reason at s"]) == (REASON, "12.50")
 
 
 @pytest.mark.parametrize(
@@ -112,29 +82,12 @@ def test_loop(fields, level, message):
     health = loop_health("fleet0", changed(LOOP, **fields))
     assert (health.name, health.hardware_id) == ("fleet0: loop", "fleet0")
     assert (health.level, health.message) == (level, message)
-    assert health.values["memory MB"] == "190"
+    assert loop_health("move_base0", LOOP, "quad0").hardware_id == "quad0"
 
 
-def test_levels_are_numbered_as_in_the_messages():
-    assert list(map(int, Level)) == [0, 1, 2, 3]
-
-
-def test_loop_of_one_robot_is_that_robots():
-    health = loop_health("move_base0", LOOP, "quad0")
-    assert (health.name, health.hardware_id) == ("move_base0: loop", "quad0")
-
-
-@pytest.mark.parametrize(
-    "name, hardware_id, logged",
-    [
-        ("move_base0: inputs", "quad0", "quad0: inputs"),
-        ("fleet0: loop", "fleet0", "fleet0: loop"),
-        ("mission: quad1", "quad1", "mission: quad1"),
-        ("simulator: clock", "simulator", "simulator: clock"),
-    ],
-)
-def test_log_lines_of_a_navigator_begin_with_the_robot(name, hardware_id, logged):
-    assert logged_name(name, hardware_id) == logged
+def test_log_lines_of_a_navigator_begin_with_the_robot():
+    assert logged_name("move_base0: inputs", "quad0") == "quad0: inputs"
+    assert logged_name("fleet0: loop", "fleet0") == "fleet0: loop"
 
 
 def test_the_same_change_of_many_robots_is_one_line():
