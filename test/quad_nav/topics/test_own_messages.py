@@ -191,28 +191,16 @@ def test_texts_of_others_have_no_characters_that_a_terminal_obeys():
     assert (info.title, info.robots[0].name) == ("a[2Jb", "q")
 
 
-def test_a_robot_is_free_or_its_command_is_limited():
+def test_a_right_of_way_comes_back_with_its_holding_point_and_who_limits_it():
     assert right_of_way(None, "") == RightOfWay()
-    limited = RightOfWay(Kind.LIMITED, "quad3", None, "quad3", "limited by quad3")
-    assert right_of_way(None, "quad3") == limited
+    limited = right_of_way(None, "quad3")
+    assert limited == RightOfWay(Kind.LIMITED, "quad3", None, "quad3", "limited by quad3")
     assert limited.decision is None
-
-
-def test_a_robot_that_makes_room_names_its_holding_point_and_who_limits_it():
-    changed = right_of_way(MAKING_ROOM, "quad3")
-    fields = {
-        "kind": Kind.MAKES_ROOM,
-        "peer": "quad2",
-        "has_hold": True,
-        "hold_x": 1.5,
-        "hold_y": -2.25,
-        "limited_by": "quad3",
-        "text": "making room for quad2 (higher priority) at (1.50, -2.25)",
-    }
-    assert changed.fields == fields
-    assert right_of_way_from_message(SimpleNamespace(**fields)) == changed
-    assert changed.decision is not None
-    assert changed.decision.holding_point == Pose2D(1.5, -2.25)
+    told = right_of_way(MAKING_ROOM, "quad3")
+    assert told.text == "making room for quad2 (higher priority) at (1.50, -2.25)"
+    assert (told.kind, told.peer, told.limited_by) == (Kind.MAKES_ROOM, "quad2", "quad3")
+    assert right_of_way_from_message(passed_on("quad/RightOfWay", told.fields)) == told
+    assert told.decision.holding_point == Pose2D(1.5, -2.25)
 
 
 @pytest.mark.parametrize(

@@ -78,25 +78,31 @@ def test_thousands_of_boxes_are_one_list():
     assert shown[-1].points_m[3] == pytest.approx((5.0, -3.0, 1.0))
 
 
-def test_quadcopters_move_with_their_frames():
-    parts = quadcopter_markers(2)
-    assert {part.frame for part in parts} == {"base_link0", "base_link1"}
-    assert all(part.frame_locked for part in parts)
+def test_quadcopters_move_with_their_frames_and_their_numbers_grow_with_the_arena():
+    small, large = (
+        number_markers(2, Scene("it", side_m, side_m, 1.0, Walls(), (), ()))
+        for side_m in (12.0, 40.0)
+    )
+    parts = [*quadcopter_markers(2), *small]
+    assert {(part.frame, part.frame_locked) for part in parts} == {
+        ("base_link0", True),
+        ("base_link1", True),
+    }
     assert len({(part.namespace, part.number) for part in parts}) == len(parts)
+    assert [one.text for one in small] == ["0", "1"]
+    assert [one.size_m[2] for one in (small[0], large[0])] == pytest.approx([0.4, 1.0])
+    assert small[0].place_m[1] >= BODY_RADIUS_M + 0.5 * small[0].size_m[2]
 
 
-def test_the_active_goal_is_large_and_the_reached_one_dim():
-    sequencer = Sequencer(GoalSequence((Goal(1.0, 0.0), Goal(2.0, 0.0), Goal(3.0, 0.0))))
+def test_the_active_goal_is_large_the_reached_one_dim_and_a_yaw_has_an_arrow():
+    sequencer = Sequencer(GoalSequence((Goal(1.0, 0.0), Goal(2.0, 0.0, -0.5), Goal(3.0, 0.0))))
     sequencer.tick(0.0, Pose2D(0.0, 0.0))
     sequencer.tick(1.0, Pose2D(1.0, 0.0))  # the first is reached, the second sent
-    spheres = [m for m in goal_markers([sequencer], 1.0) if m.kind == SPHERE]
+    markers = goal_markers([sequencer], 1.5)
+    spheres = [m for m in markers if m.kind == SPHERE]
     assert [m.size_m[0] for m in spheres] == [0.30, 0.45, 0.30]
     assert [m.rgba[3] for m in spheres] == [0.2, 1.0, 0.75]
-
-
-def test_a_goal_with_a_yaw_has_an_arrow():
-    sequencer = Sequencer(GoalSequence((Goal(1.0, 0.0), Goal(2.0, 0.0, -0.5), Goal(3.0, 0.0))))
-    (arrow,) = [m for m in goal_markers([sequencer], 1.5) if m.kind == ARROW]
+    (arrow,) = [m for m in markers if m.kind == ARROW]
     assert (arrow.namespace, arrow.number, arrow.yaw_rad) == ("goal0_yaw", 1, -0.5)
     assert arrow.place_m == (2.0, 0.0, 1.5) and arrow.size_m[0] > 0.45
 
@@ -111,21 +117,11 @@ def test_a_path_has_poses_5_cm_apart_and_is_published_twice_a_second():
     assert published == [0, 20, 40]
 
 
-def test_a_path_that_does_not_grow_is_not_published():
-    path = FlownPath(lambda stamp_s, pose: pose)
-    assert [path.add(stamp_s, Pose3D(0.0, 0.0, 1.0)) for stamp_s in (0.0, 1.0, 2.0)] == [
-        True,
-        False,
-        False,
-    ]
-
-
-def test_a_cleared_path_starts_again():
-    path = FlownPath(lambda stamp_s, pose: stamp_s)
-    path.add(7.0, Pose3D(0.0, 0.0, 1.0))
+def test_a_path_that_does_not_grow_is_not_published_until_it_is_cleared():
+    path, here = FlownPath(lambda stamp_s, pose: stamp_s), Pose3D(0.0, 0.0, 1.0)
+    assert [path.add(stamp_s, here) for stamp_s in (7.0, 8.0, 9.0)] == [True, False, False]
     path.clear()
-    assert path.add(1.0, Pose3D(0.0, 0.0, 1.0))
-    assert list(path.poses) == [1.0]
+    assert path.add(1.0, here) and list(path.poses) == [1.0]
 
 
 def costmap(**params):
@@ -138,18 +134,12 @@ def test_windows_add_up_between_two_publications():
     schedule = CostmapSchedule(costmap(publish_frequency_hz=1.0))
     assert not schedule.add(0.4, Window(0, 2, 0, 2))
     assert not schedule.add(0.8, NO_CELLS)
-    assert schedule.add(1.0, Window(4, 5, 1, 3))
+    assert schedule.add(1.2, Window(4, 5, 1, 3))  # late, which does not delay the next one
     assert schedule.pop() == Window(0, 5, 0, 3)
     assert schedule.pop() == NO_CELLS
-    assert not schedule.add(1.8, NO_CELLS)
-    assert schedule.add(2.0, NO_CELLS)
-
-
-def test_a_late_update_does_not_delay_what_is_published_after_it():
-    schedule = CostmapSchedule(costmap(publish_frequency_hz=1.0))
-    assert schedule.add(1.2, NO_CELLS)
     assert not schedule.add(1.9, NO_CELLS)
     assert schedule.add(2.0, NO_CELLS)
+    assert not CostmapSchedule(costmap(publish_frequency_hz=0.0)).add(9.0, Window(0, 2, 0, 2))
 
 
 def test_publishing_is_due_one_period_after_a_clock_jump():
@@ -160,52 +150,24 @@ def test_publishing_is_due_one_period_after_a_clock_jump():
     assert schedule.add(51.5, NO_CELLS)
 
 
-def test_without_a_frequency_nothing_is_published():
-    assert not CostmapSchedule(costmap(publish_frequency_hz=0.0)).add(100.0, Window(0, 2, 0, 2))
-
-
-def test_a_grid_that_moved_is_published_in_full():
+def test_a_grid_that_moved_is_published_in_full_and_others_if_that_is_wanted():
     moving = costmap(publish_frequency_hz=1.0, rolling_window=True)
     schedule = CostmapSchedule(moving)
     assert [schedule.pop_full_grid(), schedule.pop_full_grid()] == [True, False]
     moving.update(1.0, Pose2D(3.0, 3.0))
     assert [schedule.pop_full_grid(), schedule.pop_full_grid()] == [True, False]
-
-
-def test_always_send_full_costmap():
     schedule = CostmapSchedule(costmap(publish_frequency_hz=1.0, always_send_full_costmap=True))
     assert [schedule.pop_full_grid(), schedule.pop_full_grid()] == [True, True]
-
-
-def test_numbers_stand_beside_the_quadcopters_and_grow_with_the_arena():
-    small, large = (
-        number_markers(2, Scene("it", side_m, side_m, 1.0, Walls(), (), ()))
-        for side_m in (12.0, 40.0)
-    )
-    assert [(one.text, one.frame, one.frame_locked) for one in small] == [
-        ("0", "base_link0", True),
-        ("1", "base_link1", True),
-    ]
-    assert [one.size_m[2] for one in (small[0], large[0])] == pytest.approx([0.4, 1.0])
-    assert small[0].place_m[1] >= BODY_RADIUS_M + 0.5 * small[0].size_m[2]
-    bodies = {(one.namespace, one.number) for one in quadcopter_markers(2)}
-    assert bodies.isdisjoint((one.namespace, one.number) for one in small)
 
 
 # Goals of the fleet.
 
 
-def test_a_goal_goes_to_the_nearest_quadcopter():
-    router = GoalRouter()
-    places = {0: (0.0, 0.0), 1: (4.0, 0.0)}
+def test_a_goal_goes_to_the_selected_quadcopter_else_to_the_nearest():
+    router, places = GoalRouter(), {0: (0.0, 0.0), 1: (4.0, 0.0)}
     assert router.route(3.0, 0.0, places) == Route(1, "nearest, 1.00 m from it")
     assert router.route(2.0, 1.0, places).robot == 0  # as near: the lower number
     assert router.route(2.0, 1.0, {}) is None
-
-
-def test_a_goal_goes_to_the_selected_quadcopter_until_it_is_deselected():
-    router = GoalRouter()
-    places = {0: (0.0, 0.0), 1: (4.0, 0.0)}
     assert "quad1 selected" in router.click(4.0, 0.9, places)
     assert router.route(0.0, 0.0, places) == Route(1, "selected")
     assert router.route(0.0, 0.0, {0: (0.0, 0.0)}).robot == 1  # also while its place is unknown
@@ -213,10 +175,6 @@ def test_a_goal_goes_to_the_selected_quadcopter_until_it_is_deselected():
     assert "quad1 deselected" in router.click(4.0, 0.0, places)
     assert router.route(0.0, 0.0, places).robot == 0
     assert selection_markers(router.selected) == []
-
-
-def test_a_click_beside_all_quadcopters_deselects():
-    router = GoalRouter()
-    router.click(0.0, 0.0, {0: (0.0, 0.0)})
-    assert "no quadcopter within 1 m" in router.click(1.1, 0.0, {0: (0.0, 0.0)})
+    router.click(0.0, 0.0, places)
+    assert "no quadcopter within 1 m" in router.click(1.1, 0.0, places)
     assert router.selected is None

@@ -33,7 +33,7 @@ TRACKS = Tracks(
 SUSPECTS = np.array([(1.0, 2.0, 0.0, 0.0, 0.25), (3.0, 4.0, -0.8, 0.0, 0.3)])
 
 
-def test_a_track_has_a_disc_an_ellipse_and_an_arrow_to_where_it_is_in_a_second():
+def test_a_track_has_a_disc_an_ellipse_and_if_it_moves_an_arrow_to_its_place_in_a_second():
     markers = track_markers(TRACKS, "odom0")
     moving = {one.namespace: one for one in markers if one.number == 7}
     assert set(moving) == {"disc", "ellipse", "number", "velocity"}
@@ -43,14 +43,9 @@ def test_a_track_has_a_disc_an_ellipse_and_an_arrow_to_where_it_is_in_a_second()
     assert arrow.kind == ARROW and arrow.size_m[0] == 1.5
     assert arrow.yaw_rad == pytest.approx(math.pi / 2)
     assert all(one.frame == "odom0" for one in markers)
-
-
-def test_a_track_that_stands_has_no_arrow_and_a_hidden_one_is_paler():
-    markers = track_markers(TRACKS, "map")
     standing = {one.namespace: one for one in markers if one.number == 9}
-    seen = next(one for one in markers if one.number == 7 and one.namespace == "disc")
     assert "velocity" not in standing
-    assert standing["disc"].rgba[3] < seen.rgba[3]
+    assert standing["disc"].rgba[3] < moving["disc"].rgba[3]  # it is hidden
 
 
 def test_ellipses_beyond_0_3_m_are_paler_by_the_ratio_of_their_radii():
@@ -104,9 +99,6 @@ def test_messages_tell_the_rows_of_tracks_and_suspects():
     first, second = message.obstacles
     assert (first.number, second.number, second.unseen) == (7, 9, 0.4)
     assert first.covariance.tolist() == COVARIANCE.ravel().tolist()
-
-
-def test_no_tracks_are_no_rows():
     none = Tracks.none(0.0)
     assert rows_of_message(message_of(none)).shape == track_rows(none).shape == (0, 6)
 
@@ -136,7 +128,7 @@ def test_the_ellipse_is_turned_to_its_larger_axis():
     assert axes == pytest.approx((3.0, 1.0)) and direction_rad == pytest.approx(math.pi / 6)
 
 
-def test_tracks_are_published_at_10_hz_and_once_more_when_they_end():
+def test_tracks_and_suspects_are_published_at_10_hz_and_once_more_when_they_end():
     schedule = TrackSchedule()
     assert schedule.pop(0.0, None) is None
     assert schedule.pop(0.1, Tracks.none(0.0)) is None
@@ -144,10 +136,7 @@ def test_tracks_are_published_at_10_hz_and_once_more_when_they_end():
     assert published == [0, 4, 8, 12, 16, 20, 24, 28, 32, 36]
     ended = [schedule.pop(4.0 + k / 40, None) for k in range(40)]
     assert [len(one) for one in ended if one is not None] == [0]
-
-
-def test_suspects_are_published_without_any_track_and_once_more_when_they_end():
-    schedule, suspected = TrackSchedule(), replace(Tracks.none(3.0), suspects=SUSPECTS)
-    assert schedule.pop(3.0, suspected) is suspected
-    ended = [schedule.pop(3.0 + k / 40, Tracks.none(4.0)) for k in range(40)]
+    suspected = replace(Tracks.none(5.0), suspects=SUSPECTS)
+    assert schedule.pop(5.0, suspected) is suspected
+    ended = [schedule.pop(5.0 + k / 40, Tracks.none(5.0)) for k in range(40)]
     assert len([one for one in ended if one is not None]) == 1

@@ -36,18 +36,16 @@ def test_the_future_begins_one_second_ahead(accept):
     assert accept("map", "odom0", 100.0)
 
 
-@pytest.mark.parametrize("stamp_s", [4294967295.99, 4294967290.0, 2.0**31])
-def test_stamps_for_which_tf2_aborts(accept, stamp_s):
-    with pytest.raises(ValueError, match="expected 2147480048 s"):
-        accept("map", "odom0", stamp_s, now_s=stamp_s)
+def test_stamps_for_which_tf2_aborts(accept):
+    for stamp_s in (2.0**31, 4294967295.99):
+        with pytest.raises(ValueError, match="expected 2147480048 s"):
+            accept("map", "odom0", stamp_s, now_s=stamp_s)
 
 
 @pytest.mark.parametrize(
     "pose, reason",
     [
         (Pose3D(math.nan, 0.0, 0.0), "expected finite coordinates"),
-        (Pose3D(0.0, math.inf, 0.0), "expected finite coordinates"),
-        (Pose3D(0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0)), "quaternion of squared length 0"),
         (Pose3D(0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 1.01)), "quaternion of squared length 1.02"),
         (Pose3D(0.0, 0.0, 0.0, (math.nan, 0.0, 0.0, 1.0)), "quaternion of squared length nan"),
     ],
@@ -71,19 +69,11 @@ def test_a_leading_slash_is_no_part_of_the_name(accept):
         accept("/odom0", "odom0")
 
 
-def test_each_stamp_is_stored_once(accept):
-    # tf2 prints TF_REPEATED_DATA for a second one.
-    assert accept("map", "odom0", 99.0)
-    assert accept("map", "odom0", 100.0)
-    assert not accept("map", "odom0", 99.0)
-    assert not accept("map", "odom0", 100.0)
-    assert accept("map", "odom0", 99.5)
-
-
-def test_transforms_older_than_tf2_keeps(accept):
-    # tf2 prints TF_OLD_DATA for them.
-    assert accept("map", "odom0", 100.0)
-    assert accept("map", "odom0", 90.0)
+def test_what_tf2_prints_lines_about(accept):
+    """A stamp that it has, TF_REPEATED_DATA, and one before those it keeps, TF_OLD_DATA."""
+    assert accept("map", "odom0", 99.0) and accept("map", "odom0", 100.0)
+    assert not accept("map", "odom0", 99.0) and not accept("map", "odom0", 100.0)
+    assert accept("map", "odom0", 99.5) and accept("map", "odom0", 90.0)
     with pytest.raises(ValueError, match="10.50 s older than the newest one, expected 10 s"):
         accept("map", "odom0", 89.5)
 
