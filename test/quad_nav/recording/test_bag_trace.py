@@ -154,38 +154,29 @@ def test_odometry_alone_makes_a_trace(tmp_path):
 def test_odometry_is_put_into_the_map(tmp_path):
     """odom0 lies 10 m along x of map and is turned to the left."""
     quarter = Pose3D(10.0, 0.0, 0.0, quaternion_from_yaw(np.pi / 2))
+    moved = messages.transform(quarter, "map", "odom0", 10**9)
     path = bag(
         tmp_path / "flight.bag",
-        (
-            "/tf",
-            10**9,
-            messages.message(
-                "tf2_msgs/TFMessage", [messages.transform(quarter, "map", "odom0", 10**9)]
-            ),
-        ),
+        ("/tf", 10**9, messages.message("tf2_msgs/TFMessage", [moved])),
         ("/odom0", 10**9, odometry(10**9, 1.0)),
     )
     assert read_trace(path).robots[0].positions_m == pytest.approx(np.array([[10.0, 1.0, 1.0]]))
 
 
-def test_a_wall_clock_of_the_recorder_is_ignored(tmp_path):
-    """Recorded at a wall time of 1e9 s, while the simulation's clock was at 2 s."""
+def test_a_wall_clock_of_the_recorder_and_repeated_odometry_are_ignored(tmp_path):
+    """Recorded at a wall time of 1e9 s, while the simulation's clock was at 2 s and stood."""
     wall = 10**18
     path = bag(
         tmp_path / "flight.bag",
         ("/odom0", wall, odometry(10**9, 0.0)),
         ("/clock", wall + 1, messages.clock(2 * 10**9)),
         ("/cmd_vel0", wall + 2, messages.command(Twist2D(0.3, 0.0, 0.1))),
+        *(("/odom0", wall + k, odometry(2 * 10**9, 0.5)) for k in (3, 4)),
     )
     (robot,) = read_trace(path).robots
     assert robot.command_times_s.tolist() == [1.0]
     assert robot.commands.tolist() == [[0.3, 0.0, 0.1]]
-
-
-def test_a_paused_simulation_s_odometry_counts_once(tmp_path):
-    again = ("/odom0", 3 * 10**9, odometry(2 * 10**9, 0.5))
-    path = bag(tmp_path / "flight.bag", ("/odom0", 10**9, odometry(10**9, 0.0)), again, again)
-    assert read_trace(path).robots[0].times_s.tolist() == [0.0, 1.0]
+    assert robot.times_s.tolist() == [0.0, 1.0]
 
 
 def test_information_of_several_nodes_is_merged(tmp_path):
@@ -221,26 +212,19 @@ def test_a_person_who_is_not_in_the_scene_is_refused(tmp_path):
 
 
 def test_navfn_s_plan_published_twice_is_one(tmp_path):
-    def path_of(*xs):
-        poses = [messages.pose_stamped(Pose3D(x, 0.0, 0.0), "map", 10**9) for x in xs]
-        return messages.message("nav_msgs/Path", messages.header("map", 10**9), poses)
-
-    topic = "/move_base0/NavfnROS/plan"
+    plans = [np.array([[float(x), 0.0, 0.0] for x in range(count)]) for count in (2, 3)]
+    data = (messages.plan_bytes(plan, "map", 10**9) for plan in plans)
+    shown = [messages.decode(one, "nav_msgs/Path") for one in data]
     path = bag(
         tmp_path / "flight.bag",
         ("/odom0", 10**9, odometry(10**9, 0.0)),
-        (topic, 10**9, path_of(0.0, 1.0)),
-        (topic, 10**9, path_of(0.0, 1.0, 2.0)),
+        *(("/move_base0/NavfnROS/plan", 10**9, one) for one in shown),
     )
     ((_, plan),) = read_trace(path).robots[0].plans
     assert plan[:, 0].tolist() == [0.0, 1.0, 2.0]
 
 
 # What is no recording.
-
-
-def cut(part):
-    return lambda data: data[: int(part * len(data))]
 
 
 def with_a_damaged_chunk(data):
@@ -254,16 +238,15 @@ def with_a_damaged_chunk(data):
         (None, ".*expected a "),
         (lambda data: b"", ".*expected"),
         (lambda data: b"no bag at all\n" * 50, ".*expected"),
-        (lambda data: bytes(range(256)) * 40, ".*expected"),
-        *((cut(part), "") for part in (0.3, 0.9, 0.99)),
+        (lambda data: data[: len(data) // 3], ""),
+        (lambda data: data[:-20], ""),
         (with_a_damaged_chunk, "damaged file"),
     ],
 )
 def test_what_is_no_recording_is_refused_by_name(tmp_path, damage, problem):
     path = tmp_path / "flight.bag"
     if damage is not None:
-        stamps = range(10**9, 100 * 10**9, 10**9)
-        bag(path, *(("/odom0", stamp, odometry(stamp, 0.0)) for stamp in stamps))
+        bag(path, *(("/odom0", k * 10**9, odometry(k * 10**9, 0.0)) for k in range(1, 100)))
         path.write_bytes(damage(path.read_bytes()))
     with pytest.raises(InputError, match=f"flight.bag: {problem}"):
         read_trace(path)
@@ -295,11 +278,13 @@ def test_an_invalid_message_is_named(tmp_path, topic, content):
         read_trace(path)
 
 
-def test_a_recording_of_an_older_version_is_refused(tmp_path):
-    path = bag(
-        tmp_path / "flight.bag", ("/quad/flight", 1, messages.message("std_msgs/String", "{}"))
-    )
+def test_a_recording_of_an_older_version_or_without_odometry_is_refused(tmp_path):
+    text = messages.message("std_msgs/String", "{}")
+    path = bag(tmp_path / "flight.bag", ("/quad/flight", 1, text))
     with pytest.raises(InputError, match="/quad/flight: is std_msgs/String, as quad 0.2.0 rec"):
+        read_trace(path)
+    path = bag(tmp_path / "clock.bag", ("/clock", 10**9, messages.clock(10**9)))
+    with pytest.raises(InputError, match="no odometry; expected messages nav_msgs/Odometry on /od"):
         read_trace(path)
 
 
@@ -307,10 +292,4 @@ def test_a_message_with_another_definition_is_refused(tmp_path, monkeypatch):
     path = bag(tmp_path / "flight.bag", ("/quad/flight", 1, messages.flight_info(FlightInfo())))
     monkeypatch.setattr(bag_file, "definition", lambda kind: ("", "0" * 32))
     with pytest.raises(InputError, match="quad/FlightInfo has another definition"):
-        read_trace(path)
-
-
-def test_a_recording_without_odometry_is_refused(tmp_path):
-    path = bag(tmp_path / "flight.bag", ("/clock", 10**9, messages.clock(10**9)))
-    with pytest.raises(InputError, match="no odometry; expected messages nav_msgs/Odometry on /od"):
         read_trace(path)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from recorded_flight import setup
+from rosbags.rosbag1 import Reader
 
 from quad_nav.cli import main
 from quad_nav.errors import InputError
@@ -55,50 +56,45 @@ def test_an_older_recording_stays_until_the_new_one_is_complete(tmp_path):
 
 
 class Stop(FlightObserver):
-    """Ends the flight at once, as Ctrl-C does."""
+    """Ends the flight at once, as Ctrl-C does, or fails."""
 
     stop_reason = ""
 
+    def __init__(self, fails):
+        self._fails = fails
+
     def on_move(self, flight):
+        if self._fails:
+            raise ZeroDivisionError
         self.stop_reason = INTERRUPTED
 
 
-class Faulty(FlightObserver):
-    """Fails at once."""
-
-    def on_move(self, flight):
-        raise ZeroDivisionError
-
-
 @pytest.mark.parametrize(
-    "ends, reason", [(Stop, INTERRUPTED), (Faulty, "ended by ZeroDivisionError")]
+    "fails, reason", [(False, INTERRUPTED), (True, "ended by ZeroDivisionError")]
 )
-def test_a_flight_that_ends_early_leaves_a_recording(tmp_path, ends, reason):
+def test_a_flight_that_ends_early_leaves_a_recording(tmp_path, fails, reason):
     path = tmp_path / "flight.bag"
     with contextlib.suppress(ZeroDivisionError):
-        summary = fly(setup(tmp_path), [Recorder(path), ends()])
-        assert (ends, summary.reason, summary.success) == (Stop, INTERRUPTED, False)
+        summary = fly(setup(tmp_path), [Recorder(path), Stop(fails)])
+        assert (fails, summary.reason, summary.success) == (False, INTERRUPTED, False)
     assert read(path, FLIGHT_TOPIC)[-1].content.reason == reason
 
 
-class SizeLimit:
+@contextlib.contextmanager
+def size_limit(size):
     """No file can grow beyond so many bytes, as if the disk were full."""
-
-    def __init__(self, size):
-        self._size = size
-
-    def __enter__(self):
-        self._before = resource.getrlimit(resource.RLIMIT_FSIZE)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (self._size, self._before[1]))
-
-    def __exit__(self, *_):
-        resource.setrlimit(resource.RLIMIT_FSIZE, self._before)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def test_a_full_disk_ends_the_flight_and_what_was_recorded_is_readable(tmp_path):
     path = tmp_path / "flight.bag"
     long_flight = read_setup(FlightOptions(shipped("scenes", "arena.yaml"), shipped("goals")))
-    with SizeLimit(500_000):
+    with size_limit(500_000):
         summary = fly(long_flight, [Recorder(path)])
     assert summary.reason == "cannot write the recording: File too large"
     assert summary.exit_status == 1
@@ -109,7 +105,7 @@ def test_a_full_disk_ends_the_flight_and_what_was_recorded_is_readable(tmp_path)
 def test_a_disk_that_is_full_at_the_end_is_reported(tmp_path):
     path, whole = tmp_path / "flight.bag", tmp_path / "whole.bag"
     fly(setup(tmp_path), [Recorder(whole)])
-    with SizeLimit(whole.stat().st_size - 100):
+    with size_limit(whole.stat().st_size - 100):
         summary = fly(setup(tmp_path), [Recorder(path)])
     assert all(robot.reached == len(robot.legs) for robot in summary.robots)
     assert summary.reason == "cannot write the recording: File too large"
@@ -121,14 +117,15 @@ def noise_bag(path, size):
     noise = np.random.default_rng(0).bytes(1_050_000)
     data = len(noise).to_bytes(4, "little") + noise
     file = create(path)
-    with SizeLimit(size):
+    with size_limit(size):
         topic = file.add_topic("/noise", "std_msgs/String", False, "/test")
         with pytest.raises(OSError):
             for k in range(1, 9):
                 file.write(topic, k * 10**9, data)
         with pytest.raises(OSError):
             file.close()
-    found = list(_raw(path))
+    with Reader(path) as reader:
+        found = [(stamp, bytes(content)) for _, stamp, content in reader.messages()]
     assert all(content == data for _, content in found)
     return [stamp // 10**9 for stamp, _ in found]
 
@@ -143,20 +140,12 @@ def test_as_many_chunks_stay_as_there_is_room_for(tmp_path):
 
 def test_a_flight_without_room_for_anything_gives_the_reason(tmp_path):
     path = tmp_path / "flight.bag"
-    with SizeLimit(5_000):
+    with size_limit(5_000):
         summary = fly(setup(tmp_path, time_limit_s=0.1), [Recorder(path)])
     assert summary.reason == (
         "time limit of 0.1 s; cannot write the recording: no room for a single chunk"
     )
     assert not path.exists()
-
-
-def _raw(path):
-    from rosbags.rosbag1 import Reader
-
-    with Reader(path) as reader:
-        for _, stamp, content in reader.messages():
-            yield stamp, bytes(content)
 
 
 def test_the_command_records(tmp_path):
