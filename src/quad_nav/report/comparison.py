@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Callable, List, Optional, Sequence, Tuple
+from typing import Callable, Dict, List, Optional, Sequence, Tuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from quad_nav.report.compared_flight import (
     ComparedFlight,
@@ -14,12 +19,15 @@ from quad_nav.report.compared_flight import (
 )
 from quad_nav.report.flight_metrics import FlightMetrics
 from quad_nav.report.matplotlib_figures import paths_picture
-from quad_nav.report.metrics_picture import grouped, metrics_picture
 from quad_nav.report.page import Page, Section, picture, render
 from quad_nav.report.paths import MOST_OVERLAID, overlaid_paths
 from quad_nav.report.plotly_figures import paths_plot
+from quad_nav.report.style import ALARM, colour, new_figure, robot_legend
 
 _MOST_NUMBERS = 6  # in the head of a column
+_BOX_FROM = 5  # flights; for fewer, the dots alone are clearer
+_COUNTS = ("recoveries", "contacts")
+_PANELS = ("mission time", "detour", "recoveries", "min clearance", "min separation", "contacts")
 
 
 @dataclass(frozen=True)
@@ -79,7 +87,7 @@ def comparison_page(flights: Sequence[ComparedFlight]) -> Page:
         "comparison.html.jinja",
         [_paths(flights, metrics), _dots(metrics)],
         flights=metrics,
-        groups=grouped(metrics),
+        groups=_grouped(metrics),
         columns=columns,
         rows=list(zip(metrics, zip(*cells))) if cells else [],
         comparable=comparable,
@@ -142,5 +150,78 @@ def _dots(metrics: Sequence[FlightMetrics]) -> Section:
         "comparison",
         "Side by side",
         "A dot is a flight. Boxes span the middle half of five or more flights, with the median.",
-        (picture("comparison", "Metrics of each flight", lambda: metrics_picture(metrics)),),
+        (picture("comparison", "Metrics of each flight", lambda: _metrics_picture(metrics)),),
     )
+
+
+def _grouped(flights: Sequence[FlightMetrics]) -> Dict[str, List[FlightMetrics]]:
+    """Group flights by the name of their configuration, in order of appearance."""
+    groups: Dict[str, List[FlightMetrics]] = {}
+    for flight in flights:
+        groups.setdefault(flight.config_name or "unknown", []).append(flight)
+    return groups
+
+
+def _metrics_picture(flights: Sequence[FlightMetrics]) -> Figure:
+    """Draw each flight as a dot, and failed flights as red crosses."""
+    groups = _grouped(flights)
+    figure = new_figure(5.2)
+    panels = [column for title in _PANELS for column in COLUMNS if column.title == title]
+    for axes, column in zip(figure.subplots(2, 3).flat, panels):
+        unit = f" ({column.unit})" if column.unit else ""
+        axes.set_title(column.title.capitalize() + unit)
+        axes.grid(axis="x", visible=False)
+        for k, group in enumerate(groups.values()):
+            _draw_group(axes, k, [(flight, column.value(flight)) for flight in group])
+        axes.set(xticks=range(len(groups)), xlim=(-0.6, len(groups) - 0.4))
+        axes.set_xticklabels(
+            list(groups),
+            rotation=0 if len(groups) < 4 else 25,
+            ha="center" if len(groups) < 4 else "right",
+        )
+        if column.title in _COUNTS:
+            axes.yaxis.get_major_locator().set_params(integer=True)
+            axes.set_ylim(bottom=-0.3, top=max(axes.get_ylim()[1], 1.3))
+    robot_legend(
+        figure,
+        (),
+        [
+            Line2D([], [], ls="", marker="o", color=colour(0), label="successful flight"),
+            Line2D(
+                [], [], ls="", marker="X", ms=8, color=ALARM, mec="white", label="failed flight"
+            ),
+        ],
+    )
+    return figure
+
+
+def _draw_group(
+    axes: Axes, column: int, values: Sequence[Tuple[FlightMetrics, Optional[float]]]
+) -> None:
+    known = [(flight, value) for flight, value in values if value is not None]
+    if len(known) >= _BOX_FROM:
+        axes.boxplot(
+            [value for _, value in known],
+            positions=[column],
+            widths=0.6,
+            showfliers=False,
+            boxprops={"color": "#9aa4ae"},
+            manage_ticks=False,
+            whiskerprops={"color": "#9aa4ae"},
+            capprops={"color": "#9aa4ae"},
+            medianprops={"color": "black", "lw": 1.4},
+        )
+    # Side by side in the order of the flights: equal values do not hide each other.
+    places = column + (np.linspace(-0.2, 0.2, len(known)) if len(known) > 1 else np.zeros(1))
+    for place, (flight, value) in zip(places, known):
+        axes.plot(
+            place,
+            value,
+            "o" if flight.success else "X",
+            ms=5.5 if flight.success else 7.5,
+            color=colour(0) if flight.success else ALARM,
+            mec="white",
+            mew=0.6,
+            alpha=0.9,
+            zorder=5,
+        )

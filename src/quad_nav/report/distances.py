@@ -9,10 +9,11 @@ from typing import List, Optional, Sequence, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.mission.distances import nearest_separations_m
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.encounters import CLOSE_M, Encounter
 from quad_nav.report.marks import Marks, encounter_marks
-from quad_nav.report.measures import Tracks, clearances_m, separations_m, speed_mps
+from quad_nav.report.measures import Tracks, clearances_m, speed_mps
 
 SHOWN_M = 3.0
 """Larger distances are cut off."""
@@ -73,7 +74,8 @@ def distance_panels(
     """
     panels = []
     if len(trace.robots) > 1:
-        gaps_m = _touching(trace, tracks, separations_m(tracks, trace.robot_radius_m), True)
+        gaps_m = nearest_separations_m(tracks.positions_m, trace.robot_radius_m)
+        gaps_m = _touching(trace, tracks, gaps_m, True)
         pairs = [one.other is not None for one in marked]
         marks = encounter_marks(
             marked,

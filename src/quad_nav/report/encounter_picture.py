@@ -8,9 +8,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 from numpy.typing import NDArray
 
+from quad_nav.mission.distances import separations_m
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.encounters import Encounter, separation_text
-from quad_nav.report.measures import Tracks, pair_separations_m
+from quad_nav.report.measures import Tracks
 from quad_nav.report.scene_drawing import draw_hull, draw_moving, draw_scene
 from quad_nav.report.style import ALARM, QUIET, colour, new_figure
 
@@ -87,7 +88,8 @@ def _gap(trace: FlightTrace, tracks: Tracks, encounter: Encounter, now: int, nea
         return separation_text(encounter.separation_m)
     if encounter.other is None:
         return ""
-    gap_m = pair_separations_m(tracks, encounter.robot, encounter.other, trace.robot_radius_m)[now]
+    both = tracks.positions_m[[encounter.robot, encounter.other], now]
+    gap_m = float(separations_m(*both, trace.robot_radius_m))
     # Around a contact, hulls that overlap by millimetres touch.
     return separation_text(max(gap_m, 0.0) if encounter.separation_m == 0.0 else gap_m)
 

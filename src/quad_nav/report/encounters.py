@@ -9,8 +9,9 @@ from typing import Dict, List, Optional, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.mission.distances import separations_m
 from quad_nav.recording.trace import FlightTrace
-from quad_nav.report.measures import Tracks, pair_separations_m, runs
+from quad_nav.report.measures import Tracks, runs
 
 CLOSE_M = 0.5
 """Separation below which two robots have a close encounter."""
@@ -70,7 +71,7 @@ def separation_text(separation_m: float) -> str:
 
 
 def _of_pair(trace: FlightTrace, tracks: Tracks, a: int, b: int, below_m: float) -> List[Encounter]:
-    separation_m = pair_separations_m(tracks, a, b, trace.robot_radius_m)
+    separation_m = separations_m(*tracks.positions_m[[a, b]], trace.robot_radius_m)
     close = separation_m < below_m
     if not close.any():
         return []

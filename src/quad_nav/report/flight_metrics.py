@@ -7,7 +7,7 @@ from typing import Optional, Tuple
 
 import numpy as np
 
-from quad_nav.mission.distances import gap_m
+from quad_nav.mission.distances import gap_m, nearest_separations_m
 from quad_nav.recording.trace import FlightTrace, RobotTrace
 from quad_nav.report.measures import (
     Tracks,
@@ -16,7 +16,6 @@ from quad_nav.report.measures import (
     mission_span,
     path_length_m,
     resampled_tracks,
-    separations_m,
     smallest,
     speed_mps,
     spins,
@@ -123,7 +122,7 @@ def flight_metrics(trace: FlightTrace, tracks: Optional[Tracks] = None) -> Fligh
     """Compute the metrics of a flight; ``tracks`` are its resampled tracks, if known."""
     tracks = resampled_tracks(trace) if tracks is None else tracks
     clearances = clearances_m(tracks, trace)
-    separations = separations_m(tracks, trace.robot_radius_m)
+    separations = nearest_separations_m(tracks.positions_m, trace.robot_radius_m)
     robots = tuple(
         _robot(robot, trace, smallest(clearances[k]), smallest(separations[k]))
         for k, robot in enumerate(trace.robots)

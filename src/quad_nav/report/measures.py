@@ -79,16 +79,6 @@ def speed_mps(robot: RobotTrace) -> NDArray[np.float64]:
     return np.hypot(robot.velocities[:, 0], robot.velocities[:, 1])
 
 
-def pair_separations_m(tracks: Tracks, a: int, b: int, radius_m: float) -> NDArray[np.float64]:
-    """Return the distances between the hulls of two robots, shape (t,)."""
-    return distances.separations_m(tracks.positions_m[a], tracks.positions_m[b], radius_m)
-
-
-def separations_m(tracks: Tracks, radius_m: float) -> NDArray[np.float64]:
-    """Return each robot's separation from its nearest peer, shape (n, t); NaN without one."""
-    return distances.nearest_separations_m(tracks.positions_m, radius_m)
-
-
 def clearances_m(tracks: Tracks, trace: FlightTrace) -> NDArray[np.float64]:
     """Return each robot's clearance, shape (n, t); NaN without a scene."""
     if trace.scene is None or tracks.positions_m.size == 0:

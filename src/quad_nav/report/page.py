@@ -95,6 +95,15 @@ def render(
         folder: Further folder with templates.
         context: Variables of the template.
     """
+    has_plots = any(section.plots for section in sections)
+    scripts = plot_scripts() if has_plots else Scripts()
+    html = html_of(template, folder, sections=sections, scripts=scripts, **context)
+    pictures = (one for section in sections for one in (*section.paper, *section.pictures))
+    return Page(html, tuple(pictures))
+
+
+def html_of(template: str, folder: Optional[Path] = None, **context: Any) -> str:
+    """Render a template of this folder, or of a further one."""
     folders = [Path(__file__).parent, *([folder] if folder is not None else [])]
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(folders),
@@ -104,11 +113,7 @@ def render(
         lstrip_blocks=True,
     )
     environment.filters["figure"] = _number
-    has_plots = any(section.plots for section in sections)
-    scripts = plot_scripts() if has_plots else Scripts()
-    html = environment.get_template(template).render(sections=sections, scripts=scripts, **context)
-    pictures = (one for section in sections for one in (*section.paper, *section.pictures))
-    return Page(html, tuple(pictures))
+    return environment.get_template(template).render(**context)
 
 
 def _number(value: Optional[float], decimals: int = 2) -> str:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import base64
-from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence
 
-import jinja2
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.report.page import html_of
 from quad_nav.report.preview_picture import cost_png, costmap_extent, shown_area
 from quad_nav.report.scene_drawing import MOVING, keyframe_paths, outline, outlines
 from quad_nav.scenario.preview import MissionPreview, RobotPreview
@@ -55,12 +54,7 @@ def preview_page(data: Mapping[str, Any]) -> str:
     Args:
         data: Result of ``page_data``.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader([Path(__file__).parent]),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    return environment.get_template("preview.html.jinja").render(data=data)
+    return html_of("preview.html.jinja", data=data)
 
 
 def _robot_data(robot: RobotPreview) -> Dict[str, Any]:

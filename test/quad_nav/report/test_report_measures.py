@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from hand_made_traces import RADIUS_M, SCENE, TIMES_S, flight, goal, robot
 
+from quad_nav.mission.distances import nearest_separations_m
 from quad_nav.report.flight_metrics import flight_metrics
 from quad_nav.report.measures import (
     clearances_m,
     resampled_tracks,
     runs,
-    separations_m,
     speed_mps,
     spins,
     straight_length_m,
@@ -28,7 +28,7 @@ def test_gap_between_two_that_meet_head_on():
     tracks = resampled_tracks(
         flight(robot(0, (1.0, 2.0), (1.0, 0.0)), robot(1, (11.0, 2.0), (-1.0, 0.0)))
     )
-    gaps_m = separations_m(tracks, RADIUS_M)
+    gaps_m = nearest_separations_m(tracks.positions_m, RADIUS_M)
     assert gaps_m[0] == pytest.approx(np.abs(10.0 - 2.0 * TIMES_S) - 0.6)
     assert gaps_m[1] == pytest.approx(gaps_m[0])
 
@@ -36,7 +36,9 @@ def test_gap_between_two_that_meet_head_on():
 @pytest.mark.parametrize("x_m, gaps_m", [([1.0, 4.0, 6.0], [2.4, 1.4, 1.4]), ([1.0], [math.nan])])
 def test_gap_is_to_the_nearest_other_robot(x_m, gaps_m):
     tracks = resampled_tracks(flight(*(robot(k, (x, 1.0)) for k, x in enumerate(x_m))))
-    assert separations_m(tracks, RADIUS_M)[:, 0] == pytest.approx(gaps_m, nan_ok=True)
+    assert nearest_separations_m(tracks.positions_m, RADIUS_M)[:, 0] == pytest.approx(
+        gaps_m, nan_ok=True
+    )
 
 
 def test_clearance_is_to_the_pillar_or_a_wall():
