@@ -31,11 +31,9 @@ def test_two_pass_each_other():
     assert (one.robot, one.other, one.names) == (0, 1, ("quad0", "quad1"))
     assert (one.time_s, one.separation_m) == (pytest.approx(5.0), pytest.approx(0.4))
     assert (one.x_m, one.y_m) == (pytest.approx(3.5), pytest.approx(2.5))
-
-
-def test_farther_than_the_threshold_is_no_encounter():
     assert found_in(passing(1.2)) == ()
     assert len(found_in(passing(1.2), below_m=0.7)) == 1
+    assert found_in(flight(robot(0, (1.0, 1.0)))) == found_in(flight()) == ()
 
 
 def test_what_repeats_soon_is_one_encounter():
@@ -55,21 +53,12 @@ def test_what_repeats_soon_is_one_encounter():
 
 
 def test_contacts_with_obstacles_come_first_and_the_closest_next():
-    trace = flight(
-        robot(0, (1.0, 1.0)),
-        robot(1, (2.0, 1.0)),
-        robot(2, (1.0, 1.8)),
-        contacts=[
-            Contact(2.0, "quad2", "pillar", 5.0, 5.0),
-            Contact(3.0, "quad2", "pillar", 5.0, 5.0),
-            Contact(8.0, "quad2", "pillar", 5.0, 5.0),
-        ],
-    )
+    touched = [Contact(time_s, "quad2", "pillar", 5.0, 5.0) for time_s in (2.0, 3.0, 8.0)]
+    robots = (robot(k, at) for k, at in enumerate([(1.0, 1.0), (2.0, 1.0), (1.0, 1.8)]))
+    trace = flight(*robots, contacts=touched)
     found = found_in(trace)
-    assert [(one.names, one.time_s) for one in found[:2]] == [
-        (("quad2", "pillar"), 2.0),
-        (("quad2", "pillar"), 8.0),
-    ]
+    assert {one.names for one in found[:2]} == {("quad2", "pillar")}
+    assert [one.time_s for one in found[:2]] == [2.0, 8.0]
     assert found[0].other is None and (found[0].x_m, found[0].y_m) == (5.0, 5.0)
     assert [one.names for one in found[2:]] == [("quad0", "quad2"), ("quad0", "quad1")]
 
@@ -97,26 +86,16 @@ def test_the_legend_of_paths_shows_the_letter():
     assert 0.8 < height / width < 1.3
 
 
-def test_a_single_robot_has_no_encounters():
-    assert found_in(flight(robot(0, (1.0, 1.0)))) == ()
-    assert found_in(flight()) == ()
-
-
-@pytest.mark.parametrize(
-    "trace, times_s",
-    [
+def test_frames_are_a_way_of_45_cm_apart_or_1_5_s():
+    standing = flight(robot(0, (1.0, 1.0)), robot(1, (2.0, 1.0)))
+    for trace, times_s in (
         (passing(1.0), [3.2, 4.1, 5.0, 5.9, 6.8]),
-        (flight(robot(0, (1.0, 1.0)), robot(1, (2.0, 1.0))), [0.0, 1.5, 3.0]),  # they stand
-    ],
-)
-def test_frames_are_a_way_of_45_cm_apart_or_1_5_s(trace, times_s):
-    (one,) = found_in(trace)
-    assert frame_times(trace, resampled_tracks(trace), one) == pytest.approx(times_s)
+        (standing, [0.0, 1.5, 3.0]),
+    ):
+        (one,) = found_in(trace)
+        assert frame_times(trace, resampled_tracks(trace), one) == pytest.approx(times_s)
 
 
-@pytest.mark.parametrize(
-    "gap_m, text",
-    [(0.4, "gap 0.40 m"), (-0.02, "overlap 0.02 m"), (-0.004, "touching"), (0.004, "touching")],
-)
-def test_gaps_in_words(gap_m, text):
-    assert separation_text(gap_m) == text
+def test_gaps_in_words():
+    texts = [separation_text(gap_m) for gap_m in (0.4, -0.02, -0.004, 0.004)]
+    assert texts == ["gap 0.40 m", "overlap 0.02 m", "touching", "touching"]
