@@ -12,6 +12,7 @@ from quad_nav.config.costmaps import (
     normalise_costmap,
     remark_on_blindness,
 )
+from quad_nav.config.files import COSTMAPS, below
 from quad_nav.config.filters import (
     COMMAND_FILTERS,
     SCAN_FILTERS,
@@ -54,7 +55,6 @@ from quad_nav.navigator.params import NavigatorParams
 from quad_nav.parameter import POSITIVE, fixed_flag, fixed_number, fixed_whole
 from quad_nav.peers.peer_params import PeerParams
 
-COSTMAPS = ("global_costmap", "local_costmap")
 # Costmaps look for these upwards too, to the node's level.
 _INHERITED = ("footprint", "robot_radius", "obstacle_range", "raytrace_range")
 
@@ -152,14 +152,6 @@ def tables_of(tree: Mapping[str, Any]) -> Iterator[Tuple[str, Table, Mapping[str
             tables[entry["name"]] = TABLES[full_type(entry["type"])]
     for path, table in {**tables, **GROUPS}.items():
         yield path, table, below(tree, path)
-
-
-def below(tree: Mapping[str, Any], path: str) -> Any:
-    """Return the namespace at a path, {} if there is none."""
-    for name in filter(None, path.split("/")):
-        found = tree.get(name)
-        tree = found if isinstance(found, dict) else {}
-    return tree
 
 
 def load(tree: Mapping[str, Any], place: str = "") -> Configuration:

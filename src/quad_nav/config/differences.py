@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Dict, Iterator, Mapping, Tuple
 
-from quad_nav.config.configuration import COSTMAPS, below, tables_of
-from quad_nav.config.files import ParameterTree, set_value
+from quad_nav.config.configuration import tables_of
+from quad_nav.config.files import COSTMAPS, ParameterTree, below, set_value
 from quad_nav.config.notes import join
 from quad_nav.config.reader import Table
 from quad_nav.config.recoveries import CLEAR, TABLES

@@ -13,7 +13,7 @@ from typing import Any, Dict, List, Mapping, Sequence, Tuple
 
 import yaml
 
-from quad_nav.config.files import ParameterTree, merge_text, set_value
+from quad_nav.config.files import ParameterTree, merge_tree, parsed, set_value
 from quad_nav.config.notes import CAUTION, Remark
 from quad_nav.config.substitution import Shared, Substitution, TooLarge, Unresolved, is_package
 from quad_nav.errors import InputError, excerpt
@@ -104,19 +104,7 @@ class _Reader:
             raise InputError(
                 [f"{path}: nodes of type move_base: {found}; expected {expected}", *unread]
             )
-        tree = ParameterTree()
-        values: Any = self._server
-        for name in own[0].split("/"):
-            values = values.get(name) if isinstance(values, dict) else None
-        tree.update(values if isinstance(values, dict) else {})
-        prefix = f"{own[0]}/"
-        tree.origins = {
-            place[len(prefix) :]: origin
-            for place, origin in self._server.origins.items()
-            if place.startswith(prefix)
-        }
-        tree.remarks += self._server.remarks
-        return tree
+        return self._server.at(own[0])
 
     def _children(self, parent: Element, scope: _Scope) -> None:
         readers = {
@@ -231,7 +219,7 @@ class _Reader:
         if attributes.get("subst_value", "").lower() in _TRUE:
             text = scope.words.text(text)
         try:
-            merge_text(self._server, text, path, place)
+            merge_tree(self._server, parsed(text, path), place)
         except InputError:
             if self._is_of_navigation(f"{place}/"):
                 raise
