@@ -32,7 +32,7 @@ from quad_nav.config.planners import (
     normalise_planners,
     planner_keys,
     planner_params,
-    planner_type,
+    planner_table,
 )
 from quad_nav.config.plugins import plugin_name
 from quad_nav.config.reader import Table, made, normalise
@@ -136,9 +136,9 @@ def tables_of(tree: Mapping[str, Any]) -> Iterator[Tuple[str, Table, Mapping[str
     """
     tables = {"": MOVE_BASE_TABLE}
     for key in SLOTS:
-        planner = planner_type(tree, key) if key in tree else None
+        planner = planner_table(tree, key) if key in tree else None
         if planner is not None:
-            tables[plugin_name(tree[key])] = planner.table
+            tables[plugin_name(tree[key])] = planner
     for costmap in COSTMAPS:
         tables[costmap] = COSTMAP_TABLE
         for plugin in below(tree, costmap).get("plugins", ()):

@@ -101,6 +101,12 @@ class Plugin:
         return call_constructor(self.plugin_class, self.methods_of, *arguments)
 
 
+def plugin_of(kind: str, interface: Interface, namespace: Mapping[str, Any], place: str) -> Plugin:
+    """Return the plugin of a dotted name, with the parameters of its namespace."""
+    parameters = Parameters(namespace, place)
+    return Plugin(load_class(kind, interface), parameters, interface.methods_of)
+
+
 @dataclass(frozen=True)
 class PluginLayerParams(LayerParams):
     """Parameters of a plugin that is a layer; it reads them as it reads ``Parameters``."""

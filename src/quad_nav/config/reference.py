@@ -83,27 +83,27 @@ _SECTIONS: Tuple[Tuple[str, str, Table], ...] = (
     (
         "TrajectoryPlannerROS",
         f"The local planner `{DEFAULT_LOCAL_PLANNER}`.",
-        LOCAL_PLANNERS[DEFAULT_LOCAL_PLANNER].table,
+        LOCAL_PLANNERS[DEFAULT_LOCAL_PLANNER],
     ),
     (
         "DWAPlannerROS",
         "The local planner `dwa_local_planner/DWAPlannerROS`.",
-        LOCAL_PLANNERS[DWA_PLANNER].table,
+        LOCAL_PLANNERS[DWA_PLANNER],
     ),
     (
         "NavfnROS",
         f"The global planner `{DEFAULT_GLOBAL_PLANNER}`.",
-        GLOBAL_PLANNERS[DEFAULT_GLOBAL_PLANNER].table,
+        GLOBAL_PLANNERS[DEFAULT_GLOBAL_PLANNER],
     ),
     (
         "GlobalPlanner",
         "The global planner `global_planner/GlobalPlanner`.",
-        GLOBAL_PLANNERS[SEARCH_PLANNER].table,
+        GLOBAL_PLANNERS[SEARCH_PLANNER],
     ),
     (
         "CarrotPlanner",
         "The global planner `carrot_planner/CarrotPlanner`: a straight line to the goal.",
-        GLOBAL_PLANNERS[CARROT].table,
+        GLOBAL_PLANNERS[CARROT],
     ),
     (
         FIXES,

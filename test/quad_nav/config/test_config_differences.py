@@ -5,8 +5,13 @@ from __future__ import annotations
 import pytest
 
 from quad_nav import config
-from quad_nav.config.difference_table import ParameterRow, difference_list, parameter_rows
-from quad_nav.config.differences import Difference, differences
+from quad_nav.config.differences import (
+    Difference,
+    ParameterRow,
+    difference_list,
+    differences,
+    parameter_rows,
+)
 from quad_nav.files.shipped import shipped
 
 

@@ -77,6 +77,13 @@ def problems(tree):
             " more",
         ),
         (
+            {
+                "base_local_planner": "dwa_local_planner/DWAPlannerROS",
+                "latch_xy_goal_tolerance": "yes",
+            },
+            "latch_xy_goal_tolerance: 'yes' is not a boolean; expected true or false",
+        ),
+        (
             {"local_costmap": {"obstacle_layer": {"combination_method": 2}}},
             "local_costmap/obstacle_layer/combination_method: 2 is not a valid choice;"
             " expected one of 0 (Overwrite), 1 (Maximum), 99 (Nothing)",

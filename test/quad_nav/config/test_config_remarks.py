@@ -20,6 +20,10 @@ def planner(**parameters):
     return {"TrajectoryPlannerROS": parameters}
 
 
+def dwa(**parameters):
+    return {"base_local_planner": "dwa_local_planner/DWAPlannerROS", "DWAPlannerROS": parameters}
+
+
 def slow(**parameters):
     return {
         "recovery_behaviors": [{"name": "slow", "type": "MoveSlowAndClear"}],
@@ -105,6 +109,41 @@ def slow(**parameters):
             "TrajectoryPlannerROS/controller_frequency: rollouts assume 20.0 Hz, but the control"
             " loop runs"
             " at 5.0 Hz",
+        ),
+        (
+            {"GlobalPlanner": {"anything": 1}},
+            "unused",
+            "GlobalPlanner: unused: base_global_planner is navfn/NavfnROS; expected"
+            " base_global_planner=global_planner/GlobalPlanner to fly with it",
+        ),
+        (
+            {"base_global_planner": "GlobalPlanner", "GlobalPlanner": {"default_tolerance": 0.5}},
+            "ignored",
+            "GlobalPlanner/default_tolerance: ignored by move_base: read and never used",
+        ),
+        (
+            dwa(max_trans_vel=0.7),
+            "ignored",
+            "DWAPlannerROS/max_trans_vel: ignored by move_base: renamed to max_vel_trans",
+        ),
+        (
+            dwa(acc_lim_x=30.0),
+            "clamped",
+            "DWAPlannerROS/acc_lim_x: 30.0 clamped to 20.0, the largest that move_base allows",
+        ),
+        (
+            dwa(occdist_scale=0),
+            "caution",
+            "DWAPlannerROS/occdist_scale: 0 disables the scoring of obstacles: the robot may hit"
+            " them",
+        ),
+        (
+            {**dwa(), **planner(max_vel_theta=0.4)},
+            "unused",
+            "TrajectoryPlannerROS: unused: base_local_planner is"
+            " dwa_local_planner/DWAPlannerROS; expected"
+            " base_local_planner=base_local_planner/TrajectoryPlannerROS to fly with it;"
+            " rotate_recovery still reads its limits",
         ),
         (
             {"TebLocalPlannerROS": {"max_vel_x": 1.0}},

@@ -10,7 +10,7 @@ import yaml
 from quad_nav.config import load, load_files
 from quad_nav.config.configuration import MOVE_BASE_TABLE
 from quad_nav.config.fixes import GROUPS
-from quad_nav.config.local_planners import TRAJECTORY_PLANNER, TRAJECTORY_PLANNER_TABLE
+from quad_nav.config.planners import LOCAL_PLANNERS, TRAJECTORY_PLANNER
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
@@ -101,9 +101,10 @@ def test_there_are_no_other_files():
 def test_tree_is_what_move_base_leaves_on_the_parameter_server():
     left = load(tutorial(), "/move_base0").to_tree()
     recorded = yaml.safe_load(RECORDED.read_text())
+    planner = LOCAL_PLANNERS["base_local_planner/TrajectoryPlannerROS"]
     for group in GROUPS:
         del left[group]  # not in the original
-    for namespace, table in (("", MOVE_BASE_TABLE), (TRAJECTORY_PLANNER, TRAJECTORY_PLANNER_TABLE)):
+    for namespace, table in (("", MOVE_BASE_TABLE), (TRAJECTORY_PLANNER, planner)):
         for own in (one for one in table.reconfigurable if one.is_own):
             del (left[namespace] if namespace else left)[own.name]
     assert left == recorded
