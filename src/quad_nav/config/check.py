@@ -122,11 +122,10 @@ def report_text(report: Report, width: int = 100) -> str:
     """Format a report with its heading and files, in at most ``width`` columns."""
     files = report.files
     names = ", ".join(_seen_from(_root(files), str(file.path)) for file in files.files)
-    indent = {"initial_indent": "  ", "subsequent_indent": "  "}
-    unbroken = {"break_long_words": False, "break_on_hyphens": False}
+    fill = textwrap.TextWrapper(width, "  ", "  ", break_long_words=False, break_on_hyphens=False)
     parts = [
         f"{printable(_title(files))}: {counts([report])}",
-        textwrap.fill(printable(names), width, **indent, **unbroken),
+        fill.fill(printable(names)),
     ]
     if report.lines:
         parts.append("\n" + table(report.lines, _root(files), width))

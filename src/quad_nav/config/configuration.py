@@ -224,19 +224,12 @@ def navigator_params(
 ) -> NavigatorParams:
     """Make the dataclass of a normalised tree.
 
-    Args:
-        tree: The normalised tree.
-        listed: (name, type) of the ``recovery_behaviors``, None without that list.
-        given: The keys that were set.
+    ``listed`` has (name, type) of the ``recovery_behaviors``, None without that list; ``given``
+    the keys that were set.
     """
-    params = made(
-        NavigatorParams,
-        tree,
-        given,
-        recovery_behaviors=listed,
-        progress=own_params(ProgressParams, tree),
-    )
-    return with_fixes(params, tree)
+    progress = own_params(ProgressParams, tree)
+    found = made(NavigatorParams, tree, given, recovery_behaviors=listed, progress=progress)
+    return with_fixes(found, tree)
 
 
 def own_parts(tree: Mapping[str, Any]) -> Dict[str, Any]:
@@ -280,12 +273,9 @@ def _remark_on_rates(tree: Mapping[str, Any], notes: Notes) -> None:
     own_hz = local_planner_frequency(tree)
     loop_hz = tree["controller_frequency"]
     if own_hz is not None and own_hz != loop_hz:
-        planner = plugin_name(tree["base_local_planner"])
-        notes.remark(
-            join(planner, "controller_frequency"),
-            CAUTION,
-            f"rollouts assume {own_hz} Hz, but the control loop runs at {loop_hz} Hz",
-        )
+        place = join(plugin_name(tree["base_local_planner"]), "controller_frequency")
+        text = f"rollouts assume {own_hz} Hz, but the control loop runs at {loop_hz} Hz"
+        notes.remark(place, CAUTION, text)
 
 
 def _without_empty(tree: Mapping[str, Any]) -> Dict[str, Any]:

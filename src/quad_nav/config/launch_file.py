@@ -24,6 +24,7 @@ from quad_nav.files.xml_tree import MAX_DEPTH, Element
 
 _TRUE, _FALSE = ("true", "1"), ("false", "0")
 _TYPES = ("move_base", "fleet")
+_TAGS = ("arg", "include", "group", "param", "rosparam", "node")
 
 
 def is_launch_file(path: Path) -> bool:
@@ -107,14 +108,7 @@ class _Reader:
         return self._server.at(own[0])
 
     def _children(self, parent: Element, scope: _Scope) -> None:
-        readers = {
-            "arg": self._arg,
-            "include": self._include,
-            "group": self._group,
-            "param": self._param,
-            "rosparam": self._rosparam,
-            "node": self._node,
-        }
+        readers = {tag: getattr(self, f"_{tag}") for tag in _TAGS}
         self._depth += 1
         if self._depth > MAX_DEPTH:
             raise self._shared.too_large(f"{MAX_DEPTH} elements inside each other")

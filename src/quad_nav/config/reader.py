@@ -79,15 +79,7 @@ class Table:
 def normalise(
     namespace: Namespace, path: str, table: Table, notes: Notes, also_known: Iterable[str] = ()
 ) -> None:
-    """Check and complete a namespace in place.
-
-    Args:
-        namespace: The namespace, changed in place.
-        path: The namespace's path, for messages.
-        table: The parameters of the namespace.
-        notes: Receives faults and remarks.
-        also_known: Keys that other tables describe.
-    """
+    """Check and complete a namespace in place; ``also_known`` are keys that others describe."""
     if table.look is not None:
         table.look(namespace, path, notes)
     for old in table.renamed:
@@ -124,9 +116,8 @@ def normalise_value(namespace: Namespace, path: str, parameter: Parameter, notes
     value = parameter.clamp(checked)
     if value != checked:
         bound = "largest" if value < checked else "smallest"
-        notes.remark(
-            place, CLAMPED, f"{given} clamped to {value}, the {bound} that move_base allows"
-        )
+        text = f"{given} clamped to {value}, the {bound} that move_base allows"
+        notes.remark(place, CLAMPED, text)
     elif value != given:
         notes.remark(place, CLAMPED, f"{given} rounded to {value}; expected a whole number")
     namespace[parameter.name] = value
@@ -152,11 +143,11 @@ def _remark_on_other_keys(
 def made(
     owner: Type[_Params], namespace: Mapping[str, Any], given: Iterable[str] = (), **others: Any
 ) -> _Params:
-    """Make a dataclass from a normalised namespace.
+    """Make a dataclass from a normalised namespace; what that lacks has its default.
 
     Args:
         owner: The dataclass, which declares the parameters.
-        namespace: The normalised namespace; what it lacks has its default.
+        namespace: The normalised namespace.
         given: Names that were set. The others have their ``initial`` value, where they have one,
             until the first reconfiguration.
         others: Fields with other values than the namespace's.
@@ -184,11 +175,7 @@ def subtree(tree: Namespace, name: str, path: str, notes: Notes) -> Namespace:
 def named_types(entries: Any, place: str, kind: str, notes: Notes) -> Dict[str, str]:
     """Return name -> type of a list of ``{name: , type: }``; report entries of another form.
 
-    Args:
-        entries: The list, as it was written.
-        place: Path of the list.
-        kind: What an entry names, with its article, for messages.
-        notes: Receives faults.
+    ``kind`` is what an entry names, with its article.
     """
     expected = "expected {name: , type: }"
     if not isinstance(entries, list):
