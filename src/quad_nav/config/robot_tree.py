@@ -17,9 +17,9 @@ from quad_nav.config.files import (
     COSTMAPS,
     ParameterTree,
     PlacedFile,
+    files_of,
     load_files,
     merge_tree,
-    placed_files,
     set_value,
 )
 from quad_nav.errors import InputError
@@ -116,9 +116,7 @@ def _configuration(source: RobotSource) -> ParameterTree:
     name, number = source.config, str(source.number)
     folder = Path(name).expanduser()
     if source.numbered or (not folder.exists() and is_shipped(name)):
-        return load_files(
-            placed_files(config_folder(name), {"i": number}, source.numbered), {"i": number}
-        )
+        return load_files(files_of(config_folder(name), number, source.numbered), {"i": number})
     from quad_nav.config.sources import load_set, robot_set
 
     return load_set(robot_set(name, number))

@@ -29,12 +29,7 @@ def quad(tmp_path):
 
 @pytest.mark.parametrize(
     "command, package, extra",
-    [
-        ("tune", "quad_tune", "tune"),
-        ("sweep", "quad_tune", "tune"),
-        ("barn", "quad_bench", "orca"),
-        ("replay", "quad_web", "web"),
-    ],
+    [("tune", "quad_tune", "tune"), ("barn", "quad_bench", "orca"), ("replay", "quad_web", "web")],
 )
 def test_a_command_of_an_add_on_says_how_to_get_it(quad, command, package, extra):
     refused = quad(command, "--help")
