@@ -128,16 +128,13 @@ def merge_text(tree: ParameterTree, text: str, path: Path, namespace: str) -> No
 
 
 def placed_files(
-    source: Union[str, Path, Sequence[FileName]],
-    arguments: Mapping[str, str],
-    numbered: bool = False,
+    source: Union[str, Path, Sequence[FileName]], arguments: Mapping[str, str]
 ) -> List[PlacedFile]:
     """List the files of a robot with their namespaces, in the order of loading.
 
     Args:
         source: As for ``load_files``.
         arguments: As for ``load_files``.
-        numbered: Use only files of a folder that have the robot's number in their names.
 
     Raises:
         InputError: The folder or one of its four files is missing.
@@ -145,7 +142,7 @@ def placed_files(
     if isinstance(source, (str, Path)):
         return [
             PlacedFile(path, COSTMAPS if path.name.startswith(COMMON) else ("",))
-            for path in files_of(Path(source), arguments.get("i"), numbered)
+            for path in files_of(Path(source), arguments.get("i"))
         ]
     return [file if isinstance(file, PlacedFile) else PlacedFile(Path(file), ()) for file in source]
 
@@ -162,19 +159,18 @@ def is_overlay(path: Path) -> bool:
     return path.is_file() and (path.parent / BASE / f"{COMMON}.yaml").is_file()
 
 
-def files_of(folder: Path, number: Optional[str] = None, numbered: bool = False) -> List[Path]:
+def files_of(folder: Path, number: Optional[str] = None) -> List[Path]:
     """List the files of a robot in a folder, in the order of loading.
 
     Args:
         folder: The folder, or an overlay on the one called ``default`` beside it.
         number: Number of the robot.
-        numbered: Use only files with the robot's number in their names.
 
     Raises:
         InputError: The folder or one of the four files is missing.
     """
     if is_overlay(folder):
-        return [*files_of(folder.parent / BASE, number, numbered), folder]
+        return [*files_of(folder.parent / BASE, number), folder]
     if not folder.is_dir():
         raise InputError([f"{folder}: no such folder; expected a folder with {REQUIRED[0]}.yaml"])
     paths: List[Path] = []
@@ -182,12 +178,11 @@ def files_of(folder: Path, number: Optional[str] = None, numbered: bool = False)
     for stem in REQUIRED + OPTIONAL:
         plain = folder / f"{stem}.yaml"
         names = [plain] if number is None else [folder / f"{stem}{number}.yaml", plain]
-        accepted = names[:1] if numbered else names
-        found = [path for path in accepted if path.is_file()]
+        found = [path for path in names if path.is_file()]
         if found:
             paths.append(found[0])
         elif stem in REQUIRED:
-            expected = " or ".join(sorted(path.name for path in accepted))
+            expected = " or ".join(sorted(path.name for path in names))
             problems.append(f"{folder}: missing {expected}")
     if problems:
         raise InputError(problems)
