@@ -167,22 +167,18 @@ def is_overlay(path: Path) -> bool:
     return path.is_file() and (path.parent / BASE / f"{COMMON}.yaml").is_file()
 
 
-def files_of(
-    folder: Path, number: Optional[str] = None, numbered: bool = False
-) -> List[PlacedFile]:
+def files_of(folder: Path, number: Optional[str] = None) -> List[PlacedFile]:
     """List the files of a robot in a folder, in the order of loading.
 
     Args:
         folder: The folder, or an overlay on the one called ``default`` beside it.
         number: Number of the robot.
-        numbered: Use only files with the robot's number in their names.
 
     Raises:
         InputError: The folder or one of the four files is missing.
     """
     if is_overlay(folder):
-        overlay = PlacedFile(folder, ("",))
-        return [*files_of(folder.parent / BASE, number, numbered), overlay]
+        return [*files_of(folder.parent / BASE, number), PlacedFile(folder, ("",))]
     if not folder.is_dir():
         raise InputError([f"{folder}: no such folder; expected a folder with {REQUIRED[0]}.yaml"])
     files: List[PlacedFile] = []
@@ -190,12 +186,11 @@ def files_of(
     for stem in REQUIRED + OPTIONAL:
         plain = folder / f"{stem}.yaml"
         names = [plain] if number is None else [folder / f"{stem}{number}.yaml", plain]
-        accepted = names[:1] if numbered else names
-        found = [path for path in accepted if path.is_file()]
+        found = [path for path in names if path.is_file()]
         if found:
             files.append(PlacedFile(found[0], COSTMAPS if stem == COMMON else ("",)))
         elif stem in REQUIRED:
-            expected = " or ".join(sorted(path.name for path in accepted))
+            expected = " or ".join(sorted(path.name for path in names))
             problems.append(f"{folder}: missing {expected}")
     if problems:
         raise InputError(problems)
