@@ -107,15 +107,6 @@ def connect(
     ]
 
 
-def place_maps(
-    robot: str, costmap: LayeredCostmap, transforms: Transforms, warnings: ThrottledWarnings
-) -> None:
-    """Give a costmap the poses of its frame in those of its maps; see `map_poses`."""
-    poses = map_poses(robot, costmap, transforms, warnings)
-    if poses:
-        costmap.set_map_poses(poses)
-
-
 def map_poses(
     robot: str, costmap: LayeredCostmap, transforms: Transforms, warnings: ThrottledWarnings
 ) -> Dict[str, Optional[Pose3D]]:
