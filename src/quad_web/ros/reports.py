@@ -20,6 +20,7 @@ from quad_nav.geometry import yaw_from_quaternion
 from quad_nav.mission.actions import Event
 from quad_nav.peers.right_of_way import YieldDecision
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
+from quad_nav.ros.common.rospy_repairs import topic_of
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.topics.contacts import CONTACTS_TOPIC, contact_from_message
@@ -236,6 +237,5 @@ class FlightReports:
 
 def _robot_of_topic(message: Any) -> Optional[int]:
     """Return the number of the robot whose topic a message came from."""
-    topic = message._connection_header.get("topic", "")
-    found = re.match(r"/move_base(\d{1,4})/", topic)
+    found = re.match(r"/move_base(\d{1,4})/", topic_of(message))
     return int(found[1]) if found else None

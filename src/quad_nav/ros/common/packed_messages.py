@@ -22,6 +22,7 @@ from tf2_msgs.msg import TFMessage
 
 from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.conversions import time_message
+from quad_nav.ros.common.rospy_repairs import serialised
 
 STATES_TOPIC = "/quad/states"
 _COUNT = struct.Struct("<I")
@@ -249,7 +250,7 @@ class TransformWriter:
         data[self._stamps] = np.frombuffer(_STAMP.pack(stamp.secs, stamp.nsecs), np.uint8)
         rows = np.ascontiguousarray(poses, "<f8")
         data[self._poses] = rows.view(np.uint8).reshape(len(rows), 8 * _POSE)
-        return _serialised(data.tobytes())
+        return serialised(data.tobytes())
 
 
 class OdometryWriter:
@@ -276,7 +277,7 @@ class OdometryWriter:
         struct.pack_into("<3I", self._layout, 0, self._seq, stamp.secs, stamp.nsecs)
         struct.pack_into("<7d", self._layout, self._pose, *pose.tolist())
         struct.pack_into("<6d", self._layout, self._twist, *twist.tolist())
-        return _serialised(bytes(self._layout))
+        return serialised(bytes(self._layout))
 
 
 class PathMessage(Path):
@@ -351,9 +352,3 @@ def _text(text: bytes) -> bytes:
 def _places(starts: Sequence[int], size: int) -> NDArray[np.int64]:
     """Return the indices int64[n, size] of the bytes of fields of one size."""
     return np.array(starts, np.int64).reshape(-1, 1) + np.arange(size)
-
-
-def _serialised(data: bytes) -> rospy.AnyMsg:
-    message = rospy.AnyMsg()
-    message._buff = data
-    return message

@@ -20,7 +20,9 @@ from quad_nav.errors import QuadError, excerpt, printable
 from quad_nav.ros.common.rospy_repairs import (
     accept_many_connections,
     connect_once,
+    hear_first,
     hear_one_clock,
+    is_registered,
     log_without_master,
     refuse_second,
     register_again,
@@ -171,13 +173,9 @@ class TopicWatch:
 
     def add(self, subscriber: rospy.Subscriber) -> None:
         """Watch the topic of a subscriber too, until it unregisters."""
-        self._silent[subscriber.resolved_name] = subscriber, time.monotonic()
-        subscriber.impl.add_callback(self._on_message, subscriber.resolved_name)
-
-    def _on_message(self, _: rospy.Message, name: str) -> None:
-        subscriber, _since_s = self._silent.pop(name, (None, 0.0))
-        if subscriber is not None and subscriber.impl is not None:
-            subscriber.impl.remove_callback(self._on_message, name)
+        name = subscriber.resolved_name
+        self._silent[name] = subscriber, time.monotonic()
+        hear_first(subscriber, lambda: self._silent.pop(name, None))
 
     def check_clock(self) -> None:
         """Log that `/clock` has not started."""
@@ -191,7 +189,7 @@ class TopicWatch:
         if not self._silent or not self._is_due():
             return
         for name, (subscriber, since_s) in list(self._silent.items()):
-            if subscriber.impl is None:  # it has unregistered
+            if not is_registered(subscriber):
                 self._silent.pop(name, None)
             elif time.monotonic() - since_s >= SILENT_AFTER_S:
                 rospy.logwarn("%s", missing_topic(name, subscriber.type))

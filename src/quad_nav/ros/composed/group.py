@@ -20,7 +20,7 @@ from quad_nav.ros.common.conversions import ScanMessage, scan_message, time_mess
 from quad_nav.ros.common.diagnostics import publish_health
 from quad_nav.ros.common.readiness import TopicWatch, start_node
 from quad_nav.ros.common.rospy_repairs import set_time
-from quad_nav.ros.composed.own_nodes import OwnNodes, ignore_publishers
+from quad_nav.ros.composed.own_nodes import OwnNodes, hear_others_only
 from quad_nav.ros.composed.robot import ComposedRobot
 from quad_nav.ros.composed.transforms import ComposedTransforms
 from quad_nav.ros.navigator.costmap_publisher import NewSubscriber, Publish
@@ -161,7 +161,7 @@ def _start_node(
     robots: Sequence[int],
     lidars: Lidars,
 ) -> ComposedGroup:
-    ignore_publishers(OwnNodes(nodes), is_handed_over)
+    hear_others_only(OwnNodes(nodes))
     # The simulator's name, log and remappings of its name do not concern this node.
     start_node(
         nodes[process].rsplit("/", 1)[1],
@@ -186,8 +186,3 @@ class _WorkerGroup(ComposedGroup):
     def close(self) -> None:
         super().close()
         rospy.signal_shutdown("the simulation is closed")
-
-
-def is_handed_over(topic: str) -> bool:
-    """Tell whether the loop hands over the messages of a topic between the fleet's processes."""
-    return topic in ("/tf", "/tf_static") or topic.startswith("/cmd_vel")

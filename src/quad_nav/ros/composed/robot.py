@@ -66,7 +66,7 @@ class ComposedRobot(LoopRobot):
             transforms,
             self._located_now,
             names,
-            [*own_meters, *(sensor.meter() for sensor in self._sensors)],
+            [*own_meters, *(sensor.meter for sensor in self._sensors)],
         )
         self._maps = static_maps.connect(self.costmaps, self.interface.lock, names)
         global_frame = self.costmaps[0].params.global_frame

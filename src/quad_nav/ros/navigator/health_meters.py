@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from typing import Any, List, Sequence
+from typing import List, Sequence
 
 import rospy
 
@@ -25,16 +25,6 @@ class InputMeter:
         self._count = self._read = 0
         self._received_s = self._late_s = 0.0
         self._read_wall_s = time.monotonic()
-
-    @classmethod
-    def of(cls, subscriber: rospy.Subscriber, timeout_s: float = 0.0) -> InputMeter:
-        """Count the messages of a subscriber."""
-        meter = cls(subscriber.resolved_name, timeout_s)
-        subscriber.impl.add_callback(meter._on_message, None)
-        return meter
-
-    def _on_message(self, message: Any) -> None:
-        self.add(message.header.stamp.to_sec(), rospy.get_time())
 
     def add(self, stamp_s: float, now_s: float) -> None:
         """Count a message that arrives now."""

@@ -26,6 +26,7 @@ from quad_nav.peers.peer import Intention, Peer, assumed_intention, idle_priorit
 from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.nav_messages import path_message
+from quad_nav.ros.common.rospy_repairs import sender_of
 from quad_nav.ros.common.state_topics import OwnTopics
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.topics.publishing import Names
@@ -170,7 +171,7 @@ class IntentionListener:
 
     def _on_intentions(self, message: PointCloud2) -> None:
         sent_s, frame = message.header.stamp.to_sec(), message.header.frame_id
-        sender = excerpt(message._connection_header.get("callerid", "an unnamed node"))
+        sender = excerpt(sender_of(message) or "an unnamed node")
         if sender == rospy.get_name():
             return
         try:

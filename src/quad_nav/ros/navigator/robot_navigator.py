@@ -64,6 +64,7 @@ class RobotNavigator(NavigatorHost):
         self._odometry_s: Optional[float] = None  # of the last message, at first of the first step
         self._start_s: Optional[float] = None  # when it starts at the latest, set by the first step
         self._transforms, self._peers = transforms, peers
+        self._odometry_meter = InputMeter(rospy.resolve_name(names("odom")))
         self._odometry = rospy.Subscriber(names("odom"), Odometry, self._on_odometry, queue_size=1)
         self._sensors = sensors.connect(self, names)
         self._interface = RobotInterface(
@@ -71,7 +72,7 @@ class RobotNavigator(NavigatorHost):
             transforms,
             self._located_now,
             names,
-            [InputMeter.of(self._odometry), *(sensor.meter() for sensor in self._sensors)],
+            [self._odometry_meter, *(sensor.meter for sensor in self._sensors)],
         )
         self._warnings, self.health = self._interface.warnings, self._interface.health
         self._maps = static_maps.connect(self.costmaps, self._interface.lock, names)
@@ -112,12 +113,14 @@ class RobotNavigator(NavigatorHost):
         self._interface.stop()
 
     def _on_odometry(self, message: Odometry) -> None:
+        now_s = rospy.get_time()
+        self._odometry_meter.add(message.header.stamp.to_sec(), now_s)
         odom_from_base, velocity = odometry_from_message(message)
         problem = odometry_problem(message.header.frame_id, odom_from_base, velocity)
         if problem:
             self._warnings.warn(f"{self.name}: odometry dropped: {problem}")
         else:
-            self._velocity, self._odometry_s = velocity, rospy.get_time()
+            self._velocity, self._odometry_s = velocity, now_s
 
     def _step(self, now_s: float) -> None:
         navigator = self.navigator

@@ -41,6 +41,7 @@ class Sensor:
         topic: Resolved name of the topic.
         data_type: Key of `MESSAGE_TYPES`.
         intake: Validates messages and hands them to the layers.
+        meter: Counts the messages.
         subscriber: Fills the queue of waiting messages.
     """
 
@@ -48,6 +49,7 @@ class Sensor:
         self.topic = topic
         self.data_type = data_type
         self.intake = host.new_intake(sinks)
+        self.meter = InputMeter(rospy.resolve_name(topic), self.intake.expected_period_s)
         self._robot = f"quad{host.configuration.robot}"
         self._waiting: Deque[Tuple[Any, float]] = deque(maxlen=QUEUE_LENGTH)
         self._warnings = ThrottledWarnings()
@@ -58,16 +60,13 @@ class Sensor:
 
     def _store(self, message: Any) -> None:
         now_s = rospy.get_time()
+        self.meter.add(message.header.stamp.to_sec(), now_s)
         problem = stamp_problem(message.header.stamp.to_sec(), now_s)
         if problem:
             self._warn_dropped(problem)
             return
         with self._lock:
             self._waiting.append((message, now_s))
-
-    def meter(self) -> InputMeter:
-        """Return a meter of the topic's messages."""
-        return InputMeter.of(self.subscriber, self.intake.expected_period_s)
 
     def clear(self) -> None:
         """Forget waiting messages, after the clock has jumped."""
