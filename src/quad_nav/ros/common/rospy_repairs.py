@@ -102,7 +102,7 @@ def is_registered(subscriber: rospy.Subscriber) -> bool:
     return subscriber.impl is not None
 
 
-def hear_first(subscriber: rospy.Subscriber, on_first: Callable[[], None]) -> None:
+def hear_first(subscriber: rospy.Subscriber, on_first: Callable[[], object]) -> None:
     """Call a function with the first message of a subscriber, beside its own callback."""
 
     def on_message(_: Any) -> None:

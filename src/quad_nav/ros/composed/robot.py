@@ -18,7 +18,7 @@ from quad_nav.peers.peer import Peer
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator import sensors, static_maps
 from quad_nav.ros.navigator.health_meters import InputMeter
-from quad_nav.ros.navigator.intention_topics import IntentionPublisher
+from quad_nav.ros.navigator.intention_topics import robot_publisher
 from quad_nav.ros.navigator.robot_interface import RobotInterface
 from quad_nav.sim.odometry import OdomFrames
 from quad_nav.sim.robot_state import RobotState
@@ -70,7 +70,7 @@ class ComposedRobot(LoopRobot):
         )
         self._maps = static_maps.connect(self.costmaps, self.interface.lock, names)
         global_frame = self.costmaps[0].params.global_frame
-        self._intention = IntentionPublisher(names, global_frame)
+        self._intention = robot_publisher(names, global_frame)
 
     def lidar_sinks(self) -> List[Sink]:
         """List the sources of layers that are the simulated LIDAR, in its own frame."""
@@ -115,7 +115,7 @@ class ComposedRobot(LoopRobot):
                 sensor.deliver(self._transforms)
             self.interface.poll(now_s)
             self.due_s = -math.inf  # goals, requests and parameters may have changed it
-        self._intention.publish(self.navigator.peers.intention, now_s)
+        self._intention.publish({self._number: self.navigator.peers.intention}, now_s)
 
     def navigate(
         self, now_s: float, state: RobotState, peers: Sequence[Peer]
