@@ -8,9 +8,8 @@ import signal
 import socket
 import threading
 import time
-from dataclasses import dataclass
 from types import FrameType
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import rosgraph
 import rosgraph.network
@@ -95,17 +94,15 @@ def server_parameters() -> Dict[str, Any]:
 
 def escape_log_messages() -> None:
     """Escape what a terminal would obey in all further messages of this node."""
-    logging.getLogger("rosout").addFilter(_EscapedMessages())
+    logging.getLogger("rosout").addFilter(_escape)
 
 
-class _EscapedMessages(logging.Filter):
-    """Escapes and cuts messages and their arguments; lists of faults keep their lines."""
-
-    def filter(self, record: logging.LogRecord) -> bool:
-        record.msg = excerpt(str(record.msg), MAX_LOG, "\n")
-        if isinstance(record.args, tuple):
-            record.args = tuple(map(_printable_argument, record.args))
-        return True
+def _escape(record: logging.LogRecord) -> bool:
+    """Escape and cut a message and its arguments; lists of faults keep their lines."""
+    record.msg = excerpt(str(record.msg), MAX_LOG, "\n")
+    if isinstance(record.args, tuple):
+        record.args = tuple(map(_printable_argument, record.args))
+    return True
 
 
 def _printable_argument(value: object) -> object:
@@ -116,14 +113,8 @@ def _printable_argument(value: object) -> object:
     return excerpt(str(value), MAX_LOG)
 
 
-@dataclass(frozen=True)
-class Need:
-    """A condition to wait for.
-
-    Attributes:
-        is_met: Tests the condition.
-        missing: Says what is missing and what is there instead.
-    """
+class Need(NamedTuple):
+    """A condition to wait for, and a text that says what is missing and what is there instead."""
 
     is_met: Callable[[], bool]
     missing: Callable[[], str]

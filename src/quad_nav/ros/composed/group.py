@@ -34,7 +34,6 @@ class ScanTopic:
     """Publish the scans of one robot's LIDAR, the last one to each new subscriber."""
 
     def __init__(self, robot: int) -> None:
-        """Advertise the topic."""
         self._frame = f"Lidar{robot}"
         self._last: Optional[Scan] = None
         self._publisher = rospy.Publisher(

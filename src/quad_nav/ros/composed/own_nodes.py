@@ -26,7 +26,6 @@ class OwnNodes:
     """
 
     def __init__(self, names: Sequence[str] = ()) -> None:
-        """Start with the nodes' full names, if they are known."""
         self.names = tuple(names)
         self._lock = threading.Lock()
         self._addresses: Dict[str, str] = {}  # of the nodes, the latest known

@@ -44,15 +44,7 @@ class ComposedRobot(LoopRobot):
         start_s: float,
         transforms: Transforms,
     ) -> None:
-        """Build the navigator and its interface.
-
-        Args:
-            configuration: Its parameters.
-            number: Number of the robot.
-            frames: Odometry frames of all robots.
-            start_s: Time at which they began to drift.
-            transforms: Transform tree, for goals, sensors and maps in other frames.
-        """
+        """Build the navigator and its interface; the ``frames`` drift from ``start_s`` on."""
         self._names = names = in_fleet(number)
         super().__init__(configuration, number, frames, start_s)
         self._sensors = sensors.connect(self, names, self._lidar.sinks)

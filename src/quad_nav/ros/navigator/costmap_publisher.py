@@ -35,7 +35,6 @@ class NewSubscriber(rospy.SubscribeListener):
     """Call a function with the `publish` of each new subscriber."""
 
     def __init__(self, send: Callable[[Publish], None]) -> None:
-        """Start with the function."""
         super().__init__()
         self._send = send
 
@@ -52,14 +51,7 @@ class CostmapPublisher:
     def __init__(
         self, name: str, costmap: LayeredCostmap, lock: threading.RLock, names: Names = own_node
     ) -> None:
-        """Advertise the topics.
-
-        Args:
-            name: Namespace of the costmap.
-            costmap: The costmap.
-            lock: Guards the costmap.
-            names: Names of the robot's topics.
-        """
+        """Advertise the topics of costmap ``name``; ``lock`` guards it."""
         self._costmap = costmap
         self._lock = lock
         self._schedule = CostmapSchedule(costmap)
@@ -126,7 +118,6 @@ class VoxelPublisher:
     """
 
     def __init__(self, topic: str, layer: VoxelLayer) -> None:
-        """Advertise the topic."""
         self._layer = layer
         self._publisher = rospy.Publisher(topic, Marker, queue_size=1)
 

@@ -33,14 +33,7 @@ class GoalServer:
     def __init__(
         self, number: int, transforms: Transforms, global_frame: str, names: Names = own_node
     ) -> None:
-        """Start the action server.
-
-        Args:
-            number: Number of the robot.
-            transforms: Converts goals to the global frame.
-            global_frame: Frame of the navigator's goals.
-            names: Names of the robot's topics.
-        """
+        """Start the server of robot ``number``, whose navigator has goals in ``global_frame``."""
         self._robot = robot = f"quad{number}"
         self._transforms = transforms
         self._global_frame = global_frame

@@ -50,13 +50,6 @@ class NavigatorHealth:
     """
 
     def __init__(self, node: str, robot: str, inputs: Sequence[InputMeter]) -> None:
-        """Start with an idle navigator.
-
-        Args:
-            node: Name for the statuses.
-            robot: Name of the robot.
-            inputs: Meters of the robot's input topics.
-        """
         self._node, self._robot, self._inputs = node, robot, inputs
         self._state, self._is_localized = State.IDLE, False
         self._cycles = self._cycles_read = 0
@@ -121,7 +114,6 @@ class LoopHealth:
     """
 
     def __init__(self, robots: Sequence[str]) -> None:
-        """Start with the names of the robots to serve."""
         self._robots = robots
         self._late_s, self._round_s, self._round_now_s = 0.0, time.monotonic(), 0.0
         self._read_wall_s, self._read_cpu_s = time.monotonic(), time.process_time()

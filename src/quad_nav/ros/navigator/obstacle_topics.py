@@ -23,7 +23,6 @@ class ObstacleTopics:
     """Publishes the tracks of a robot's scan filters where someone listens."""
 
     def __init__(self, filters: ScanFilters, frame: str, names: Names = own_node) -> None:
-        """Advertise the topics; ``frame`` is that of the tracks."""
         self._filters, self._frame, self._schedule = filters, frame, TrackSchedule()
         self._markers = rospy.Publisher(names(f"~{MARKERS_TOPIC}"), MarkerArray, queue_size=1)
         self._obstacles = rospy.Publisher(names(f"~{TRACKS_TOPIC}"), MovingObstacles, queue_size=1)

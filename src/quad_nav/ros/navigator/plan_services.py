@@ -34,15 +34,7 @@ class PlanServices:
         locate: Locate,
         names: Names,
     ) -> None:
-        """Advertise the services.
-
-        Args:
-            host: Makes the plans.
-            topics: Publish the plans.
-            lock: Guards the navigator.
-            locate: Returns the robot's poses of now.
-            names: Names of the robot's services.
-        """
+        """Advertise the services; ``lock`` guards the navigator."""
         self._host, self._navigator = host, host.navigator
         self._topics, self._lock, self._locate = topics, lock, locate
         planner = plugin_name(host.navigator.params.base_global_planner)

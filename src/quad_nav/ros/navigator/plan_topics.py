@@ -33,7 +33,6 @@ class PlanTopics:
     """Publish command, plans, scores, state, right of way and recoveries."""
 
     def __init__(self, robot: str, navigator: Navigator, names: Names = own_node) -> None:
-        """Advertise the topics of a navigator; ``robot`` is the robot's name."""
         self._robot, self._navigator = robot, navigator
         planner = plugin_name(navigator.params.base_global_planner)
         controller = plugin_name(navigator.params.base_local_planner)

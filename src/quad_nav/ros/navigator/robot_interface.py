@@ -48,15 +48,7 @@ class RobotInterface:
         names: Names,
         inputs: Sequence[InputMeter],
     ) -> None:
-        """Advertise topics, services, action and parameters.
-
-        Args:
-            host: The navigator.
-            transforms: Transform tree, for goals in other frames.
-            locate: Returns the robot's poses of now.
-            names: Names of the robot's topics, services and parameters.
-            inputs: Meters of the robot's inputs.
-        """
+        """Advertise all; ``transforms`` are for goals in other frames."""
         number = host.configuration.robot
         self.name = f"quad{number}"
         self.lock = threading.RLock()

@@ -49,14 +49,7 @@ class RobotNavigator(NavigatorHost):
         peers: PeerTopics,
         names: Names = own_node,
     ) -> None:
-        """Build the navigator and connect it.
-
-        Args:
-            configuration: Parameters of the robot.
-            transforms: Transform tree, shared by the robots of the process.
-            peers: States of the peers, shared as well.
-            names: Names of the robot's topics, services and parameters.
-        """
+        """Build the navigator and connect it; robots of a process share transforms and peers."""
         super().__init__(configuration)
         self.number, self.name = configuration.robot, f"quad{configuration.robot}"
         self.due_s = 0.0

@@ -32,15 +32,7 @@ class MapListener:
         lock: threading.RLock,
         names: Names = own_node,
     ) -> None:
-        """Subscribe to the map.
-
-        Args:
-            costmap: Costmap of the layer.
-            name: Name of the layer.
-            layer: The static layer.
-            lock: Guards the costmap.
-            names: Names of the robot's topics.
-        """
+        """Subscribe to the map of layer ``name``; ``lock`` guards the costmap."""
         self._costmap = costmap
         self._name = name
         self._layer = layer
