@@ -150,26 +150,16 @@ class GroupMaker:
             return NavigatorGroup(setup, robots, lidars)  # a simulation alone
         if process == 0:
             return ComposedGroup(setup, robots, lidars)
-        return _start_node(self.nodes, process, setup, robots, lidars)
-
-
-def _start_node(
-    nodes: Tuple[str, ...],
-    process: int,
-    setup: LoopSetup,
-    robots: Sequence[int],
-    lidars: Lidars,
-) -> ComposedGroup:
-    hear_others_only(OwnNodes(nodes))
-    # The simulator's name, log and remappings of its name do not concern this node.
-    start_node(
-        nodes[process].rsplit("/", 1)[1],
-        [one for one in sys.argv if not one.startswith(("__name:=", "__log:="))],
-        hears_clock=False,
-    )
-    group = _WorkerGroup(setup, robots, lidars)
-    rospy.loginfo("%s: ready, robots: %d", rospy.get_name().lstrip("/"), len(robots))
-    return group
+        hear_others_only(OwnNodes(self.nodes))
+        # The simulator's name, log and remappings of its name do not concern this node.
+        start_node(
+            self.nodes[process].rsplit("/", 1)[1],
+            [one for one in sys.argv if not one.startswith(("__name:=", "__log:="))],
+            hears_clock=False,
+        )
+        group = _WorkerGroup(setup, robots, lidars)
+        rospy.loginfo("%s: ready, robots: %d", rospy.get_name().lstrip("/"), len(robots))
+        return group
 
 
 class _WorkerGroup(ComposedGroup):

@@ -24,14 +24,14 @@ from quad_nav.ros.common.nav_messages import goal_from_message, pose_stamped
 from quad_nav.ros.common.polled_actions import PolledActionServer
 from quad_nav.ros.common.rospy_repairs import reaches
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
-from quad_nav.topics.publishing import Names, own_node
+from quad_nav.topics.publishing import Names
 
 
 class GoalServer:
     """Pass the newest goal to the navigator when it accepts one."""
 
     def __init__(
-        self, number: int, transforms: Transforms, global_frame: str, names: Names = own_node
+        self, number: int, transforms: Transforms, global_frame: str, names: Names
     ) -> None:
         """Start the server of robot ``number``, whose navigator has goals in ``global_frame``."""
         self._robot = robot = f"quad{number}"

@@ -18,7 +18,7 @@ from quad_nav import config
 from quad_nav.errors import InputError
 from quad_nav.parameter import Parameter
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
-from quad_nav.topics.publishing import Names, own_node
+from quad_nav.topics.publishing import Names
 
 OnReconfigure = Callable[[str, Dict[str, Any]], config.Configuration]
 
@@ -76,7 +76,7 @@ def serve_namespaces(
     robot: str,
     configuration: config.Configuration,
     on_reconfigure: OnReconfigure,
-    names: Names = own_node,
+    names: Names,
 ) -> List[Server]:
     """Put a configuration on the parameter server and serve all its namespaces.
 

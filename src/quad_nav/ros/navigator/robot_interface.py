@@ -59,7 +59,7 @@ class RobotInterface:
             for name, costmap in zip(("global", "local"), host.costmaps)
         }
         global_frame, local_frame = (one.params.global_frame for one in host.costmaps)
-        self._topics = PlanTopics(self.name, host.navigator, names)
+        self._topics = PlanTopics(host.navigator, names)
         self._obstacles = ObstacleTopics(host.scan_filters, local_frame, names)
         self._reconfigure = serve_namespaces(
             self.name, host.configuration, self._on_reconfigure, names

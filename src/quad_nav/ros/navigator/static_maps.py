@@ -17,7 +17,7 @@ from quad_nav.geometry import Pose3D
 from quad_nav.grid import GridSpec
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
-from quad_nav.topics.publishing import Names, own_node
+from quad_nav.topics.publishing import Names
 from quad_nav.topics.validation import grid_problem
 
 
@@ -30,7 +30,7 @@ class MapListener:
         name: str,
         layer: StaticLayer,
         lock: threading.RLock,
-        names: Names = own_node,
+        names: Names,
     ) -> None:
         """Subscribe to the map of layer ``name``; ``lock`` guards the costmap."""
         self._costmap = costmap
@@ -88,7 +88,7 @@ class MapListener:
 
 
 def connect(
-    costmaps: Sequence[LayeredCostmap], lock: threading.RLock, names: Names = own_node
+    costmaps: Sequence[LayeredCostmap], lock: threading.RLock, names: Names
 ) -> List[MapListener]:
     """Subscribe to the map topic of every static layer."""
     return [
