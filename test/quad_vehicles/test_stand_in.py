@@ -19,7 +19,8 @@ from vehicles.stand_in import ACCEPTED, IN_AIR, ON_GROUND, TAKING_OFF
 from vehicles.virtual_flight import Flight
 
 from quad_nav.geometry import Pose2D
-from quad_nav.sim.scene import Box, Scene, Walls
+from quad_nav.sim.obstacles import Box
+from quad_nav.sim.scene import Scene, Walls
 from quad_nav.topics.vehicle_states import State
 
 HEADING_RAD = 0.5
