@@ -30,7 +30,8 @@ setuptools.setup(
     packages=setuptools.find_packages("src"),
     package_dir={"": "src"},
     package_data={
-        "quad_nav": ["py.typed", "*.pyi"],
+        "": ["py.typed"],
+        "quad_nav": ["*.pyi"],
         "quad_nav.config": ["*.pyi"],
         "quad_nav.report": ["*.jinja"],
         "quad_tune.report": ["*.jinja"],

@@ -116,39 +116,34 @@ class Parameter:
         Raises:
             InvalidValue: The type is wrong, or the number is not finite or not accepted.
         """
-        if self.kind == "bool":
-            if not isinstance(value, bool):
-                raise InvalidValue(f"{value!r} is not a boolean; expected {self.expected}")
-            return value
-        if self.kind == "str":
-            return self._checked_text(value)
-        return self._checked_number(value)
-
-    def _checked_text(self, value: Any) -> str:
-        if not isinstance(value, str):
-            raise InvalidValue(f"{value!r} is not a string; expected {self.expected}")
-        try:
-            self.field_value(value)
-        except ValueError as error:
-            raise InvalidValue(f"{value!r}: {error}; expected {self.expected}") from error
-        return value
-
-    def _checked_number(self, value: Any) -> Any:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise InvalidValue(f"{value!r} is not a number{_hint(value)}; expected {self.expected}")
-        if not math.isfinite(value):
-            raise InvalidValue(f"{value} is not finite; expected {self.expected}")
-        if (
-            value < 0
-            and self.domain is not Domain.ANY
-            or (value == 0 and self.domain is Domain.POSITIVE)
-        ):
-            raise InvalidValue(f"{value} is out of range; expected {self.expected}")
+        problem = self._problem(value)
+        if problem:
+            raise InvalidValue(f"{problem}; expected {self.expected}")
         if self.choices and value not in [choice.value for choice in self.choices]:
             names = ", ".join(f"{choice.value} ({choice.name})" for choice in self.choices)
             raise InvalidValue(f"{value} is not a valid choice; expected one of {names}")
         # roscpp rounds a double that is read as an int, halves upwards.
-        return float(value) if self.kind == "double" else math.floor(value + 0.5)
+        convert = {"double": float, "int": lambda number: math.floor(number + 0.5)}
+        return convert[self.kind](value) if self.kind in convert else value
+
+    def _problem(self, value: Any) -> str:
+        """Return what is wrong with a value, "" if nothing is."""
+        if self.kind == "bool":
+            return "" if isinstance(value, bool) else f"{value!r} is not a boolean"
+        if self.kind == "str":
+            if not isinstance(value, str):
+                return f"{value!r} is not a string"
+            try:
+                self.field_value(value)
+            except ValueError as error:
+                return f"{value!r}: {error}"
+            return ""
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return f"{value!r} is not a number{_hint(value)}"
+        if not math.isfinite(value):
+            return f"{value} is not finite"
+        is_refused = {NOT_NEGATIVE: value < 0, POSITIVE: value <= 0}.get(self.domain, False)
+        return f"{value} is out of range" if is_refused else ""
 
     def within_range(self, value: Any) -> Any:
         """Return the field's value for a ROS value that is within its range.
@@ -173,32 +168,27 @@ class Parameter:
         return value
 
 
-def number(
-    name: str, default: float, unit: str, low: Any, high: Any, sentence: str, **more: Any
-) -> Any:
-    """Declare a number, 0 or more; None for a range without that end."""
-    return _ranged(name, "double", default, unit, low, high, sentence, NOT_NEGATIVE, **more)
+def _numbers(kind: str, domain: Domain, doc: str) -> Callable[..., Any]:
+    """Return a function that declares numbers; None stands for a range without that end."""
+
+    def declare(
+        name: str, default: float, unit: str, low: Any, high: Any, sentence: str, **more: Any
+    ) -> Any:
+        accepted = more.pop("domain", domain)
+        return _declared(
+            Parameter(name, kind, default, sentence, unit, accepted, low, high), **more
+        )
+
+    declare.__doc__ = doc
+    return declare
 
 
-def positive(
-    name: str, default: float, unit: str, low: Any, high: Any, sentence: str, **more: Any
-) -> Any:
-    """Declare a number above 0."""
-    return _ranged(name, "double", default, unit, low, high, sentence, POSITIVE, **more)
-
-
-def signed(
-    name: str, default: float, unit: str, low: Any, high: Any, sentence: str, **more: Any
-) -> Any:
-    """Declare a number that may be negative; below its range it is clamped."""
-    return _ranged(name, "double", default, unit, low, high, sentence, ANY, **more)
-
-
-def whole(
-    name: str, default: int, unit: str, low: Any, high: Any, sentence: str, **more: Any
-) -> Any:
-    """Declare a whole number; outside of its range it is clamped."""
-    return _ranged(name, "int", default, unit, low, high, sentence, more.pop("domain", ANY), **more)
+number = _numbers("double", NOT_NEGATIVE, "Declare a number, 0 or more.")
+positive = _numbers("double", POSITIVE, "Declare a number above 0.")
+signed = _numbers(
+    "double", ANY, "Declare a number that may be negative; below its range it is clamped."
+)
+whole = _numbers("int", ANY, "Declare a whole number; outside of its range it is clamped.")
 
 
 def choice(name: str, default: int, choices: Tuple[Choice, ...], sentence: str, **more: Any) -> Any:
@@ -300,20 +290,6 @@ def as_upstream(params: _Params) -> _Params:
             changed[one.name] = as_upstream(value)
     replaced: _Params = dataclasses.replace(cast(Any, params), **changed)
     return replaced
-
-
-def _ranged(
-    name: str,
-    kind: str,
-    default: Any,
-    unit: str,
-    low: Any,
-    high: Any,
-    sentence: str,
-    domain: Domain,
-    **more: Any,
-) -> Any:
-    return _declared(Parameter(name, kind, default, sentence, unit, domain, low, high), **more)
 
 
 def _declared(parameter: Parameter, own: bool = False, **more: Any) -> Any:

@@ -25,11 +25,10 @@ from quad_rl.task import (
     command_of,
     default_reward,
     goal_distance_m,
-    make_world,
     observation_space,
     sequences_of,
 )
-from quad_rl.worlds import NavigatorWorld
+from quad_rl.worlds import BodyWorld, NavigatorWorld, World
 
 _HOVER = Command(0.0, 0.0, 0.0)
 Action = Optional[NDArray[np.float32]]
@@ -76,7 +75,8 @@ class FleetEnv(ParallelEnv):
         self.possible_agents: List[str] = [robot.name for robot in setup.robots]
         self.agents: List[str] = []
         self._numbers = {name: number for number, name in enumerate(self.possible_agents)}
-        self.world = make_world(setup, period_s, navigator or action == PARAMETERS)
+        navigator = navigator or action == PARAMETERS
+        self.world: World = (NavigatorWorld if navigator else BodyWorld)(setup, period_s)
         space = observation_space(setup)
         self._observer = Observer(setup, space)
         self._observation_spaces = dict.fromkeys(self.possible_agents, space)
@@ -150,10 +150,7 @@ class FleetEnv(ParallelEnv):
             {name: self.reward(name, one) for name, one in progress.items()},
             terminations,
             dict.fromkeys(flown, is_late),
-            {
-                name: {"reached": one.reached, "contacts": one.contacts}
-                for name, one in progress.items()
-            },
+            {name: one.info for name, one in progress.items()},
         )
 
     def reward(self, agent: str, progress: Progress) -> float:

@@ -16,7 +16,7 @@ from quad_nav.errors import InputError
 from quad_nav.mission.goal_file import GoalSequence, parse_goals
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.sim.flight import BodyState
-from quad_rl.worlds import BodyWorld, NavigatorWorld, World
+from quad_rl.worlds import World
 
 VELOCITY, PARAMETERS = "velocity", "parameters"
 ACTIONS = (VELOCITY, PARAMETERS)
@@ -52,11 +52,6 @@ class Progress:
 def default_reward(progress: Progress) -> float:
     """Return 1 per metre towards the goal, 10 per goal reached, -10 per contact, -0.01 per step."""
     return (progress.approach_m + 10.0 * progress.reached - 10.0 * progress.contacts) - 0.01
-
-
-def make_world(setup: FlightSetup, period_s: float, navigators: bool) -> World:
-    """Return the world of an environment, with or without navigators."""
-    return NavigatorWorld(setup, period_s) if navigators else BodyWorld(setup, period_s)
 
 
 def check_action(action: str, parameters: Ranges) -> None:

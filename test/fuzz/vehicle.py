@@ -4,9 +4,9 @@
     PYTHONPATH=src:test vehicle.py [SECONDS] [--messages N] [--seed K]
 
 The bridge is the real one, from the link's receiving side to the encoded bytes that it sends; its
-socket is a list and its clock virtual. A point that flies answers it. What is fed are messages of
-every kind that the bridge handles, with any bits or with one odd field, of wrong systems, cut,
-damaged, doubled, and random bytes; half of them to bridges that may arm. In turn the vehicle
+socket is a list and its clock virtual. A stand-in answers it. What is fed are messages of every
+kind that the bridge handles, with any bits or with one odd field, of wrong systems, cut, damaged,
+doubled, and random bytes; half of them to bridges that may arm. In turn the vehicle
 
 * stands on the ground, and nobody asks for anything: no order and no set-point may leave;
 * flies, and strangers send: it must fly on;
@@ -27,8 +27,8 @@ import re
 import struct
 import time
 
-from vehicles.point_vehicle import PointVehicle
-from vehicles.virtual_flight import KINDS
+from vehicles.point_bodies import PointBodies
+from vehicles.virtual_flight import STAND_INS, STEP_S
 
 from quad_nav.geometry import Twist2D
 from quad_nav.topics.vehicle_states import ON_GROUND, State
@@ -39,9 +39,9 @@ from quad_vehicles.mavlink_link import MavlinkLink, UdpSocket, ardupilotmega
 from quad_vehicles.orders import Permissions
 from quad_vehicles.states import VehicleMachine
 from quad_vehicles.telemetry import Limits
-from quad_vehicles.vehicle_file import Lidar, Vehicle
+from quad_vehicles.vehicle_file import OUR_SYSTEM, Lidar, Vehicle
 
-STEP_S, COMMAND_S = 0.01, 0.05
+COMMAND_S = 0.05
 STEPS, PER_STEP = 400, 20
 COMMAND = Twist2D(0.3, 0.1, 0.2)
 VEHICLE = ("10.0.0.1", 14550)
@@ -187,12 +187,13 @@ class FakeSocket(UdpSocket):
 
 
 class FuzzedFlight:
-    """A bridge, the point that it flies, and somebody who sends datagrams."""
+    """A bridge, the stand-in that it flies, and somebody who sends datagrams."""
 
     def __init__(self, autopilot, may_arm, seed):
         self.rng, self.now_s = random.Random(seed), 100.0
         self.autopilot, self.may_arm, self.fed = autopilot, may_arm, 0
-        self.vehicle = PointVehicle(KINDS[autopilot], heading_rad=0.6, boot_s=40.0)
+        stand_in, safe = STAND_INS[autopilot]
+        self.vehicle = stand_in(PointBodies(), parameters=safe)
         limits = Limits(speed_mps=1.0)
         traits = AUTOPILOTS[autopilot].traits
         self.machine = VehicleMachine(1.2, limits, traits, Permissions(may_arm=may_arm))
@@ -232,7 +233,7 @@ class FuzzedFlight:
         raise AssertionError((self.machine.state, self.machine.reason))
 
     def step(self, queue):
-        """Let 10 ms pass."""
+        """Let 8 ms pass."""
         self.now_s += STEP_S
         told = [(self._encoded(*one), VEHICLE) for one in self.vehicle.advance(STEP_S)]
         if self.now_s > self._mute_s:
@@ -286,7 +287,7 @@ class FuzzedFlight:
                     assert self.is_asked, "armed or took off without an order"
             if to == VEHICLE:
                 del fields["mavpackettype"]
-                self.vehicle.receive(name, fields)
+                self.vehicle.receive(name, fields, (OUR_SYSTEM, 191))
         if self.machine.state not in (State.ARMING, State.TAKING_OFF):
             self.is_asked = False
 
@@ -351,7 +352,7 @@ def to_flight(flight):
 
 
 FLIGHTS = (on_the_ground, out_of_its_mind, among_strangers, out_of_its_mind)
-CASES = list(itertools.product(FLIGHTS, KINDS, (True, False)))
+CASES = list(itertools.product(FLIGHTS, STAND_INS, (True, False)))
 
 
 def fuzz(messages, seconds, seed, tell=print):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -112,6 +113,21 @@ def test_nodes_without_bodies_do_not_load_the_physics_engine(package):
     pytest.importorskip(package)
     script = f"import sys, {NODES_WITHOUT_BODIES[package]}; assert 'pybullet' not in sys.modules"
     subprocess.run([sys.executable, "-c", script], check=True, env=ENVIRONMENT)
+
+
+PRIVATE_IN_ROSPY = re.compile(
+    r"\._connection_header|\._buff\b|\.impl\b|\brospy(\.\w+)*\._\w|from rospy\S* import .*\b_\w"
+)
+
+
+def test_one_file_touches_what_is_private_in_rospy():
+    files = [
+        *modules(),
+        *(SOURCES.parent / "nodes").iterdir(),
+        *(SOURCES.parent / "bench").glob("*.py"),
+    ]
+    users = [path.name for path in files if PRIVATE_IN_ROSPY.search(path.read_text())]
+    assert users == ["rospy_repairs.py"]
 
 
 @pytest.mark.parametrize("path", [*SOURCES.rglob("*.py")], ids=lambda path: path.name)

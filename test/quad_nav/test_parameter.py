@@ -29,7 +29,6 @@ from quad_nav.parameter import (
 )
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "parameters.md"
-PLANNERS = {**GLOBAL_PLANNERS, **LOCAL_PLANNERS}
 TABLES = {
     "move_base": MOVE_BASE_TABLE,
     "costmap": COSTMAP_TABLE,
@@ -37,7 +36,8 @@ TABLES = {
     **GROUPS,
     **LAYERS,
     **RECOVERIES,
-    **{name: planner.table for name, planner in PLANNERS.items()},
+    **GLOBAL_PLANNERS,
+    **LOCAL_PLANNERS,
 }
 
 

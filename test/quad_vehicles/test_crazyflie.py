@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from vehicles import crazyflie_failures
-from vehicles.crazyflie_flight import AHEAD, CrazyflieFlight
+from vehicles.crazyflie import Crazyflie
+from vehicles.virtual_flight import AHEAD, CrazyflieBridge, Flight
 
 from quad_nav.geometry import Pose3D, Twist2D
 from quad_nav.topics.vehicle_states import State
@@ -16,34 +16,26 @@ from quad_vehicles.frames import crazyflie_quaternion
 from quad_vehicles.orders import Permissions
 
 
-@pytest.fixture
-def flights():
-    made = []
-
-    def make(*arguments, **keywords):
-        made.append(CrazyflieFlight(*arguments, **keywords))
-        return made[-1]
-
-    yield make
-    for flight in made:
-        flight.bodies.close()
+def crazyflie(*arguments, **limits):
+    """A flight of a Crazyflie that has not taken off yet."""
+    return Flight("crazyflie", *arguments, **limits)
 
 
-def test_from_the_desk_to_the_desk(flights):
-    flight = flights().to_hover()
-    heights = [setpoint[4] for setpoint in flight.crazyflie.setpoints]
-    times = [setpoint[0] for setpoint in flight.crazyflie.setpoints]
+def test_from_the_desk_to_the_desk():
+    flight = crazyflie().to_hover()
+    heights = [setpoint[4] for setpoint in flight.vehicle.setpoints]
+    times = [setpoint[0] for setpoint in flight.vehicle.setpoints]
     # It climbs by 0.3 m/s and not in one step.
     assert np.max(np.diff(heights) / np.diff(times)) == pytest.approx(0.3, abs=0.01)
     flight.run(2.0)
-    assert flight.crazyflie.height_m == pytest.approx(1.0, abs=0.03)
+    assert flight.vehicle.height_m == pytest.approx(1.0, abs=0.03)
     assert flight.machine.land(flight.now_s, "asked").is_accepted
-    assert flight.run(10.0, lambda: flight.state is State.LANDED)
+    flight.until_state(State.LANDED, 10.0)
     flight.run(3.0)
-    assert not flight.crazyflie.is_running
-    assert flight.crazyflie.height_m == pytest.approx(0.0, abs=0.01)
+    assert not flight.vehicle.is_running
+    assert flight.vehicle.height_m == pytest.approx(0.0, abs=0.01)
     assert flight.machine.take_off(flight.now_s).is_accepted  # and again
-    assert flight.run(10.0, lambda: flight.state is State.HOLDING)
+    flight.until_state(State.HOLDING, 10.0)
 
 
 @pytest.mark.parametrize(
@@ -55,15 +47,15 @@ def test_from_the_desk_to_the_desk(flights):
         (Twist2D(2.0, 0.0, 3.0), (0.7, 0.0, 57.2958)),  # the limits: 0.7 m/s, 1 rad/s
     ],
 )
-def test_axes_units_and_limits_of_set_points(flights, command, setpoint):
-    flight = flights().to_flight(command)
-    assert flight.crazyflie.setpoints[-1][1:4] == pytest.approx(setpoint, abs=1e-4)
-    assert flight.crazyflie.setpoints[-1][4] == pytest.approx(1.0, abs=0.001)
+def test_axes_units_and_limits_of_set_points(command, setpoint):
+    flight = crazyflie().to_flight(command)
+    assert flight.vehicle.setpoints[-1][1:4] == pytest.approx(setpoint, abs=1e-4)
+    assert flight.vehicle.setpoints[-1][4] == pytest.approx(1.0, abs=0.001)
 
 
-def test_a_body_goes_where_the_command_says(flights):
+def test_a_body_goes_where_the_command_says():
     """Left and counter-clockwise, as its own log tells."""
-    flight = flights().to_flight(Twist2D(0.0, 0.2, 0.3))
+    flight = crazyflie().to_flight(Twist2D(0.0, 0.2, 0.3))
     flight.run(1.0)
     estimate = flight.adapter.estimate
     assert estimate.linear_mps[1] == pytest.approx(0.2, abs=0.05)
@@ -85,9 +77,9 @@ def test_nose_up_is_a_positive_logged_pitch_and_a_negative_pitch_of_ros(yaw_deg)
     assert left.z_m == pytest.approx(0.0, abs=1e-12)
 
 
-def test_the_multi_ranger_is_a_scan_of_four_beams(flights):
-    flight = flights()
-    flight.crazyflie.ranges_mm = [32767, 1200, 800, 0, 300]  # back, right, front, left, up
+def test_the_multi_ranger_is_a_scan_of_four_beams():
+    flight = crazyflie()
+    flight.vehicle.ranges_mm = [32767, 1200, 800, 0, 300]  # back, right, front, left, up
     flight.run(0.2)
     scan = flight.adapter.scan
     bearings = scan.angle_min_rad + scan.angle_increment_rad * np.arange(4)
@@ -95,84 +87,76 @@ def test_the_multi_ranger_is_a_scan_of_four_beams(flights):
     np.testing.assert_array_equal(scan.ranges_m, np.float32([np.inf, 1.2, 0.8, np.nan]))
 
 
-def test_nothing_turns_the_motors_without_permission(flights):
-    flight = flights(Permissions())
-    assert flight.run(5.0, lambda: flight.state is State.READY)
+def test_nothing_turns_the_motors_without_permission():
+    flight = crazyflie(Permissions())
+    flight.to_ready()
     response = flight.machine.take_off(flight.now_s)
     assert not response.is_accepted and "arm:=true" in response.text
     flight.command = AHEAD
     flight.run(2.0)
-    assert flight.calls == []
+    assert flight.sent == []
 
 
-def test_a_dry_run_sends_nothing(flights):
-    flight = flights(Permissions(may_arm=True, is_dry=True))
-    assert flight.run(5.0, lambda: flight.state is State.READY)
+def test_a_dry_run_sends_nothing():
+    flight = crazyflie(Permissions(may_arm=True, is_dry=True))
+    flight.to_ready()
     assert flight.machine.take_off(flight.now_s).is_accepted
     flight.command = AHEAD
     flight.run(3.0)
-    assert flight.state is State.FLYING and flight.calls == []
+    assert flight.state is State.FLYING and flight.sent == []
 
 
-def test_a_crazyflie_that_has_to_be_armed(flights):
-    flight = flights(arms_itself=False).to_hover()
-    assert flight.calls[0] == "arm"
+def test_a_crazyflie_that_has_to_be_armed(monkeypatch):
+    monkeypatch.setattr(
+        CrazyflieBridge,
+        "make_vehicle",
+        lambda bridge, bodies, *_: bridge.log_of(Crazyflie(bodies, arms_itself=False)),
+    )
+    assert crazyflie().to_hover().sent[0][1] == "arm"
 
 
-@pytest.mark.parametrize("row", crazyflie_failures.ROWS)
-def test_each_failure(row):
-    crazyflie_failures.fly_row(row, 0.5)
-
-
-def test_it_lands_without_commands(flights):
-    flight = flights().to_flight()
-    flight.command = None
-    assert flight.run(15.0, lambda: flight.state is State.LANDED)
-    assert flight.crazyflie.height_m < 0.06
-
-
-def test_it_sinks_to_the_ground_when_nothing_is_heard_but_it_hears(flights):
-    flight = flights().to_flight()
+def test_it_sinks_to_the_ground_when_nothing_is_heard_but_it_hears():
+    flight = crazyflie().to_flight()
     flight.hears = False
-    assert flight.run(3.0, lambda: flight.state is State.NO_LINK)
-    lowest_m = flight.crazyflie.height_m
+    flight.until_state(State.NO_LINK, 3.0)
+    lowest_m = flight.vehicle.height_m
     flight.run(8.0)
-    heights = [setpoint[4] for setpoint in flight.crazyflie.setpoints]
+    heights = [setpoint[4] for setpoint in flight.vehicle.setpoints]
     assert lowest_m > 0.9 and heights[-1] == pytest.approx(0.0, abs=0.001)
-    assert flight.crazyflie.height_m < 0.06
+    assert flight.vehicle.height_m < 0.06
     flight.run(10.0)
-    assert not flight.crazyflie.is_running
+    assert not flight.vehicle.is_running
 
 
-def test_a_link_that_comes_back_goes_on(flights):
-    flight = flights().to_flight()
+def test_a_link_that_comes_back_goes_on():
+    flight = crazyflie().to_flight()
     flight.hears = False
-    assert flight.run(3.0, lambda: flight.state is State.NO_LINK)
+    flight.until_state(State.NO_LINK, 3.0)
     flight.run(0.5)
     flight.hears = True
-    assert flight.run(1.0, lambda: flight.state is State.FLYING)
+    flight.until_state(State.FLYING, 1.0)
     flight.run(3.0)
-    assert flight.crazyflie.height_m == pytest.approx(1.0, abs=0.05)
+    assert flight.vehicle.height_m == pytest.approx(1.0, abs=0.05)
 
 
-def test_it_falls_when_it_hears_nothing(flights):
+def test_it_falls_when_it_hears_nothing():
     """What the file of the vehicles has to allow by `link_lost: falls`."""
-    flight = flights().to_flight()
+    flight = crazyflie().to_flight()
     flight.hears = flight.is_heard = False
     flight.run(1.9)
-    assert flight.crazyflie.is_running
+    assert flight.vehicle.is_running
     flight.run(0.2)
-    assert not flight.crazyflie.is_running
+    assert not flight.vehicle.is_running
 
 
-def test_a_tumble_ends_the_flight(flights):
-    flight = flights().to_flight()
-    flight.crazyflie.is_tumbled = True
-    assert flight.run(1.0, lambda: flight.state is State.TAKEN_OVER)
+def test_a_tumble_ends_the_flight():
+    flight = crazyflie().to_flight()
+    flight.vehicle.is_tumbled = True
+    flight.until_state(State.TAKEN_OVER, 1.0)
     assert (4, "the firmware has stopped the motors: it is tumbled") in flight.adapter.pop_texts()
-    before = len(flight.crazyflie.setpoints)
+    before = len(flight.vehicle.setpoints)
     flight.run(2.0)
-    assert len(flight.crazyflie.setpoints) == before
+    assert len(flight.vehicle.setpoints) == before
 
 
 @pytest.mark.parametrize(
@@ -182,24 +166,24 @@ def test_a_tumble_ends_the_flight(flights):
         ({"deck.bcFlow2": 1}, "no Multi-ranger deck"),
     ],
 )
-def test_missing_decks_are_reasons_not_to_fly(flights, parameters, fault):
-    flight = flights()
+def test_missing_decks_are_reasons_not_to_fly(parameters, fault):
+    flight = crazyflie()
     flight.adapter.connected(parameters)
     flight.run(1.0)
     assert flight.state is State.NOT_READY and fault in flight.machine.reason
 
 
 @pytest.mark.parametrize("broken", [math.nan, math.inf])
-def test_numbers_that_are_not_finite_stay_here(flights, broken):
-    flight = flights().to_flight()
-    before = len(flight.crazyflie.setpoints)
+def test_numbers_that_are_not_finite_stay_here(broken):
+    flight = crazyflie().to_flight()
+    before = len(flight.vehicle.setpoints)
     assert flight.adapter.follow(Twist2D(broken, 0.0, 0.0), flight.now_s) == (False, [])
-    values = {**flight.crazyflie.values(), "stateEstimate.x": broken}
+    values = {**flight.vehicle.values(), "stateEstimate.x": broken}
     estimate = flight.adapter.estimate
     flight.adapter.receive("pose", 0, values, flight.now_s)
     assert flight.adapter.estimate is estimate
     flight.run(1.0)
-    sent = flight.crazyflie.setpoints[before:]
+    sent = flight.vehicle.setpoints[before:]
     assert len(sent) > 10 and np.isfinite(sent).all()
 
 

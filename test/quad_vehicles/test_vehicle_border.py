@@ -50,7 +50,7 @@ def flight():
     return Flight().to_flight()
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1e30])
+@pytest.mark.parametrize("value", [math.nan, 1e30])
 @pytest.mark.parametrize("name, field", FIELDS)
 def test_a_number_out_of_its_range_is_dropped_with_a_line_and_the_flight_goes_on(
     flight, name, field, value
@@ -79,8 +79,8 @@ def test_the_same_fault_is_told_once_in_5_s():
 
 def test_an_estimator_that_fails_for_good_ends_in_a_landing():
     flight = Flight().to_flight()
-    attitude = flight.vehicle._send
-    flight.vehicle._send = lambda name, **fields: attitude(
+    attitude = flight.vehicle.send
+    flight.vehicle.send = lambda name, **fields: attitude(
         name, **{**fields, "roll": math.inf} if name == "ATTITUDE" else fields
     )
     assert flight.run(2.5, lambda: flight.state is State.LANDING)
@@ -91,8 +91,9 @@ def test_an_estimator_that_fails_for_good_ends_in_a_landing():
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
 def test_a_parameter_that_is_no_number_counts_as_no_answer(autopilot, value):
     flight = Flight(autopilot)
-    for name in failsafes.names(Vehicle(0, "mavlink", autopilot)):
-        flight.vehicle.parameters[name] = value
+    flight.vehicle._send_parameter = lambda name: flight.vehicle.send(
+        "PARAM_VALUE", param_id=name, param_value=value, param_type=9
+    )
     flight.run(10.0)
     assert flight.state is State.NOT_READY
     assert "the autopilot does not answer" in flight.machine.reason
@@ -146,8 +147,7 @@ def text_message(text, number=0):
 
 def test_a_flood_of_texts_leaves_a_short_reason():
     """8,000 different ones in a second, as a broken autopilot sends them."""
-    flight = Flight()
-    assert flight.run(10.0, lambda: flight.state is State.READY)
+    flight = Flight().to_ready()
     for k in range(8000):
         message = text_message(f"PreArm: {k} {'x' * 40}"[:49])
         flight.adapter.receive("STATUSTEXT", 1, message, flight.now_s)
@@ -167,8 +167,7 @@ def test_a_text_in_parts_without_an_end_does_not_grow():
 
 
 def test_a_flood_of_refusals_leaves_a_short_reason():
-    flight = Flight()
-    assert flight.run(10.0, lambda: flight.state is State.READY)
+    flight = Flight().to_ready()
     flight.vehicle.refuses_arming = "Gyros inconsistent"
     flight.machine.take_off(flight.now_s)
     flight.run(0.1)
@@ -212,7 +211,7 @@ def crazyflie(may_arm=True):
     return adapter
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.lists(st.tuples(BLOCKS, st.integers(-1, 2**25), st.data()), max_size=8), st.booleans())
 def test_no_value_of_a_crazyflie_raises_or_turns_the_motors(blocks, may_arm):
     adapter, now_s = crazyflie(may_arm), 100.0
@@ -241,10 +240,10 @@ def test_a_value_of_a_crazyflie_that_is_missing_or_not_finite_is_told(block):
 
 def test_fuzzed_datagrams_end_nothing_and_arm_nothing(monkeypatch):
     """The first flights of ``make fuzz TARGET=vehicle``, shortened."""
-    monkeypatch.setattr(fuzzed, "STEPS", 20)
+    monkeypatch.setattr(fuzzed, "STEPS", 10)
     told = []
-    fed, armed = fuzzed.fuzz(16 * 20 * fuzzed.PER_STEP, math.inf, 0, told.append)
-    assert (fed, armed) == (6400, 3200)
+    fed, armed = fuzzed.fuzz(16 * 10 * fuzzed.PER_STEP, math.inf, 0, told.append)
+    assert (fed, armed) == (3200, 1600)
     assert "no exception, no arming without an order" in told[-1]
 
 

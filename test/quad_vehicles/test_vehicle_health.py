@@ -8,7 +8,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import pytest
-from vehicles.virtual_flight import Flight, StandInFlight
+from vehicles.virtual_flight import Flight
 
 from quad_nav.topics.vehicle_states import State
 from quad_vehicles.autopilots import ARDUPILOT, PX4
@@ -17,7 +17,7 @@ from quad_vehicles.health_watch import HealthWatch
 from quad_vehicles.vehicle_file import OUR_SYSTEM
 
 SENSORS, BATTERY = 1467087919, 1 << 25  # health of a vehicle that hovers
-GLITCH, UNINITIALISED = 1 << 15, 1 << 10
+GLITCH = 1 << 15
 
 
 def system(millivolts=12600, charge=100, health=SENSORS):
@@ -51,12 +51,10 @@ def estimator(flags, position=0.005, velocity=0.01):
 @pytest.mark.parametrize(
     "message, least_v, problem",
     [
-        (system(), 10.5, ""),
         (system(10500), 10.5, ""),
         (system(9000), 10.5, "battery at 9.00 V, expected 10.5 V or more"),
         (system(9000), 0.0, ""),
         (system(0), 10.5, ""),  # not measured
-        (system(65535), 10.5, ""),
         (
             system(health=SENSORS & ~BATTERY),
             10.5,
@@ -80,11 +78,8 @@ def test_a_battery_that_is_not_watched_is_not_low(bits):
     [
         (ARDUPILOT, "Battery Failsafe", True),
         (ARDUPILOT, "Battery 1 is low 9.00V used 12 mAh", True),
-        (ARDUPILOT, "Battery 2 is critical 8.10V used 12 mAh", True),
         (ARDUPILOT, "Radio Failsafe", False),
         (PX4, "Low battery", True),
-        (PX4, "Critical battery", True),
-        (PX4, "Emergency battery level", True),
         (PX4, "Battery 1 disconnected", True),
         (PX4, "Takeoff detected", False),
     ],
@@ -104,21 +99,12 @@ def test_a_low_battery_lands_the_vehicle(is_told):
         said = "Battery Failsafe"
     else:
         message = system(9000) if is_told == "voltage" else system(health=SENSORS & ~BATTERY)
-        flight.vehicle._rates.pop("SYS_STATUS")
+        flight.vehicle._periods.pop("SYS_STATUS")
         flight.adapter.receive("SYS_STATUS", 1, message, flight.now_s)
         said = "battery at 9.00 V" if is_told == "voltage" else "says that the battery is low"
     assert not flight.run(1.9, lambda: flight.state is not State.FLYING)  # it may sag for 2 s
     assert flight.run(0.3, lambda: flight.state is State.LANDING)
     assert said in flight.machine.reason
-
-
-def test_a_low_battery_is_a_reason_to_stay_on_the_ground():
-    flight = StandInFlight()
-    flight.vehicle.battery, flight.vehicle.voltage_v = 100, 9.0
-    flight.run(10.0)
-    assert flight.state is State.NOT_READY
-    assert "battery at 9.00 V, expected 10.5 V or more" in flight.machine.reason
-    flight.end()
 
 
 # Position.
@@ -159,9 +145,7 @@ def test_a_receiver_that_the_estimator_does_not_use_does_not_count(autopilot, na
         (estimator(831), ""),
         (estimator(831 & ~16), ""),  # a relative position, by optical flow
         (estimator(167), "the estimator has no position that counts (flags 167)"),
-        (estimator(37), "the estimator has no position that counts (flags 37)"),
         (estimator(831 | GLITCH), "the estimator has no position that counts (flags 33599)"),
-        (estimator(831 | UNINITIALISED), "the estimator has no position that counts (flags 1855)"),
         (estimator(831, 1.0), "the estimator rejects its measurements of position or velocity"),
         (
             estimator(831, velocity=2.0),
@@ -183,10 +167,8 @@ def test_the_estimator_tells_whether_its_position_counts(message, problem):
     [
         (ARDUPILOT, "EKF variance", True),
         (ARDUPILOT, "EKF3 IMU1 stopped aiding", True),
-        (ARDUPILOT, "GPS Glitch or Compass error", True),
         (ARDUPILOT, "EKF3 IMU0 is using GPS", False),
         (PX4, "GNSS data fusion stopped", True),
-        (PX4, "GNSS data fusion started", False),
     ],
 )
 def test_texts_about_the_position_count_for_5_s(autopilot, text, counts):
@@ -196,29 +178,22 @@ def test_texts_about_the_position_count_for_5_s(autopilot, text, counts):
     assert health.position_problem(15.0) == ""
 
 
-def test_without_gps_it_hovers_lands_and_stays_on_the_ground():
-    """The recorded autopilot lands after 8.1 s, 0.63 m from where it was told to be."""
-    flight = StandInFlight().to_hover()
-    flight.run(1.0)
-    place, lost_s = flight.bodies.place(0), flight.now_s
+def test_without_gps_or_with_a_low_battery_it_stays_on_the_ground():
+    flight = Flight().to_ready()
     flight.vehicle.lose_receiver()
-    assert flight.run(2.5, lambda: flight.state is State.LANDING)
-    assert flight.now_s - lost_s < 2.3
-    assert flight.machine.reason == "the GPS has lost its position (3 satellites) for 2 s"
-    flown = flight.bodies.place(0)
-    assert max(abs(flown[k] - place[k]) for k in (0, 1)) < 0.06  # 0.5 * 0.02 m/s^2 * (2.3 s)^2
-    assert flight.run(15.0, lambda: flight.state is State.NOT_READY)
-    assert "the GPS has lost its position" in flight.machine.reason
-    flight.end()
+    flight.vehicle.battery, flight.vehicle.voltage_v = 100, 9.0
+    flight.run(2.0)
+    assert flight.state is State.NOT_READY
+    assert "the GPS has lost its position (3 satellites)" in flight.machine.reason
+    assert "battery at 9.00 V, expected 10.5 V or more" in flight.machine.reason
 
 
 def test_a_gap_of_the_receiver_is_flown_through():
-    flight = StandInFlight().to_flight()
+    flight = Flight().to_flight()
     flight.vehicle.estimator.is_dead_reckoning = True
     assert flight.run(0.9, lambda: flight.state is State.HOLDING)
     flight.vehicle.estimator.is_dead_reckoning = False
     assert flight.run(0.5, lambda: flight.state is State.FLYING)
-    flight.end()
 
 
 # The autopilot acts by itself.
@@ -236,13 +211,11 @@ def heartbeat(mode, base_mode=209):
     "mode, texts, reason",
     [
         (9, ["GCS Failsafe"], "LAND by the autopilot: GCS Failsafe"),
-        (6, ["Radio Failsafe"], "RTL by the autopilot: Radio Failsafe"),
         (
             9,
             ["EKF variance", "EKF Failsafe: changed to LAND Mode"],
             "LAND by the autopilot: EKF variance; EKF Failsafe: changed to LAND Mode",
         ),
-        (9, ["Battery Failsafe"], "LAND by the autopilot: Battery Failsafe"),
         (9, ["Radio Failsafe Cleared", "EKF3 lane switch 1"], "LAND from outside"),
         (5, [], "LOITER from outside"),
     ],
@@ -272,24 +245,24 @@ def test_the_autopilots_own_reason_for_disarming():
     flight.adapter.receive("STATUSTEXT", 1, text(words, 2), flight.now_s)
     flight.run(0.9)
     flight.vehicle.kill_motors()
+    flight.vehicle.heartbeat()
     assert flight.run(0.1, lambda: flight.state is State.TAKEN_OVER)
     assert flight.machine.reason == f"the motors were disarmed by the autopilot: {words}"
 
 
-def test_many_texts_make_no_long_reason():
+def test_old_texts_explain_nothing_and_many_make_no_long_reason():
     flight = Flight().to_flight()
     for k in range(1000):
         flight.adapter.receive("STATUSTEXT", 1, text(f"Failsafe {k}"), flight.now_s)
+    flight.run(2.0)
+    for k in range(1000, 2000):
+        flight.adapter.receive("STATUSTEXT", 1, text(f"Failsafe {k}"), flight.now_s)
     flight.vehicle.set_mode(9)
     flight.run(0.1)
-    told = "; ".join(f"Failsafe {k}" for k in range(996, 1000))
+    told = "; ".join(f"Failsafe {k}" for k in range(1996, 2000))
     assert flight.machine.reason == f"the mode was changed to LAND by the autopilot: {told}"
-
-
-def test_an_old_text_explains_nothing():
     flight = Flight().to_flight()
-    words = "Radio Failsafe - Continuing Guided Mode"
-    flight.adapter.receive("STATUSTEXT", 1, text(words), flight.now_s)
+    flight.adapter.receive("STATUSTEXT", 1, text("Radio Failsafe - Continuing"), flight.now_s)
     flight.run(2.0)
     flight.vehicle.set_mode(5)
     flight.run(0.1)
@@ -301,7 +274,7 @@ def test_an_old_text_explains_nothing():
 
 def test_another_station_with_our_number_is_told_and_keeps_the_vehicle_on_the_ground():
     flight = Flight()
-    assert flight.run(10.0, lambda: flight.state is State.READY)
+    flight.to_ready()
     for _ in range(4):
         other = SimpleNamespace(autopilot=8)
         flight.adapter.receive_other(OUR_SYSTEM, other, flight.now_s)
@@ -314,12 +287,6 @@ def test_another_station_with_our_number_is_told_and_keeps_the_vehicle_on_the_gr
     flight.adapter.receive_other(OUR_SYSTEM, SimpleNamespace(autopilot=8), flight.now_s)
     flight.run(0.5)
     assert flight.state is State.FLYING and flight.news[-1][1].startswith(told)
-
-
-def test_a_station_with_another_number_is_no_problem():
-    flight = Flight()
-    flight.adapter.receive_other(255, SimpleNamespace(autopilot=8), flight.now_s)
-    assert flight.run(10.0, lambda: flight.state is State.READY)
 
 
 def test_heartbeats_of_other_vehicles_are_told_while_the_vehicle_is_not_heard():

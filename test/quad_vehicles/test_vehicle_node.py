@@ -11,7 +11,7 @@ rospy = pytest.importorskip("rospy")
 
 from ros.fake_ros import FakePublisher, FakeRos, FakeService  # noqa: E402
 from std_srvs.srv import TriggerRequest  # noqa: E402
-from vehicles.virtual_flight import StandInFlight  # noqa: E402
+from vehicles.virtual_flight import Flight  # noqa: E402
 
 from quad_nav.geometry import Pose2D  # noqa: E402
 from quad_nav.topics.vehicle_states import State  # noqa: E402
@@ -30,9 +30,7 @@ def ros():
 
 @pytest.fixture
 def flight():
-    made = StandInFlight()
-    yield made
-    made.end()
+    return Flight()
 
 
 class Bridge(VehicleLink):

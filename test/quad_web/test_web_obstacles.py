@@ -18,7 +18,8 @@ from quad_nav.geometry import Pose3D, quaternion_from_yaw  # noqa: E402
 from quad_nav.ros.common.conversions import pose_array_message  # noqa: E402
 from quad_nav.sim.motion import Motion, Walkers  # noqa: E402
 from quad_nav.sim.movers import Movers  # noqa: E402
-from quad_nav.sim.scene import Box, MovingObstacle, Scene, Walls  # noqa: E402
+from quad_nav.sim.obstacles import Box  # noqa: E402
+from quad_nav.sim.scene import MovingObstacle, Scene, Walls  # noqa: E402
 from quad_nav.topics.obstacle_poses import POSES_TOPIC  # noqa: E402
 from quad_nav.topics.tracked_obstacles import obstacle_fields  # noqa: E402
 from quad_web.ros.layers import TrackIntake  # noqa: E402

@@ -157,7 +157,7 @@ class Navigators:
         self._hand_on_goals()
         self.fly(1.5)
         for k, robot in enumerate(self.fleet.robots):
-            state, command = robot._navigator.state, robot._interface._topics._command.last
+            state, command = robot.navigator.state, robot._interface._topics._command.last
             assert state in (State.CONTROLLING, State.PLANNING), f"robot {k} is {state}"
             assert command is not None and math.isfinite(command.linear.x), command
             speed = abs(command.linear.x) + abs(command.angular.z)

@@ -1,17 +1,22 @@
 #!/usr/bin/env python3
-"""A node started by roslaunch finds ROS, the virtual environment and the package."""
+"""Nodes find ROS, the virtual environment and the package; the user's shell stays as it is."""
 
 from __future__ import annotations
 
 import importlib
 import os
+import subprocess
 import sys
 import unittest
+from pathlib import Path
 
 import rosgraph
 import rospy
 import rostest
 from std_msgs.msg import String
+
+ROOT = Path(__file__).resolve().parents[2]
+PATH = "/usr/bin:/bin"
 
 
 class Environment(unittest.TestCase):
@@ -33,8 +38,22 @@ class Environment(unittest.TestCase):
 
         self.assertTrue(quad_nav.ros.__file__)
 
-    def test_this_machine_is_reached_by_a_name_that_resolves(self):
-        self.assertTrue({"ROS_HOSTNAME", "ROS_IP"} & set(os.environ))
+    def test_sourcing_the_workspace_leaves_the_users_shell_alone(self):
+        script = 'source .ws/devel/setup.bash; command -v python3; echo "$ROS_HOSTNAME$ROS_IP$PATH"'
+        shell = subprocess.run(
+            ["bash", "-c", script], cwd=ROOT, env={"PATH": PATH}, stdout=subprocess.PIPE, check=True
+        )
+        python, rest = shell.stdout.decode().splitlines()
+        self.assertEqual(python, "/usr/bin/python3")
+        self.assertTrue(rest.endswith(PATH), rest)
+        self.assertNotIn(".venv", rest)
+
+    def test_nodes_have_the_virtual_environment_whatever_the_path(self):
+        script = "source .ws/devel/setup.bash; .ws/devel/lib/quad/run_module site"
+        shell = subprocess.run(
+            ["bash", "-c", script], cwd=ROOT, env={"PATH": PATH}, stdout=subprocess.PIPE, check=True
+        )
+        self.assertIn(f"{ROOT}/.venv/lib", shell.stdout.decode())
 
     def test_messages_pass(self):
         rospy.init_node("environment")

@@ -72,6 +72,14 @@ class Crazyflie:
         """Whether the motors turn."""
         return self._bodies.lift_mps2[self._robot] is not None
 
+    def freeze(self):
+        """Let the estimate stay what it is."""
+        self.is_frozen = True
+
+    def jump(self, north_m):
+        """Let the estimate jump."""
+        self.shift_m = north_m
+
     # From the radio.
 
     def hover(self, vx, vy, yaw_degps, z_m):

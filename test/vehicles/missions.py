@@ -19,16 +19,13 @@ import math
 import statistics
 import sys
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 
 import numpy as np
 from vehicles.bodies import Bodies
-from vehicles.crazyflie import AIRFRAME as CRAZYFLIE_AIRFRAME
-from vehicles.crazyflie import Crazyflie, LogBlocks
 from vehicles.estimator import LocalFrame
 from vehicles.stand_in import advance
 from vehicles.virtual_flight import AIRFRAMES as BARE_AIRFRAMES
-from vehicles.virtual_flight import STAND_INS
+from vehicles.virtual_flight import bridge_of
 
 import quad_nav.api as quad
 from quad_nav.geometry import Pose2D, Pose3D
@@ -38,15 +35,9 @@ from quad_nav.sim.flight import AIRFRAMES, BodyState
 from quad_nav.sim.simulation import Simulation
 from quad_nav.sim.simulation_params import STEP_S
 from quad_nav.topics.vehicle_states import State
-from quad_vehicles import crazyflie_adapter
-from quad_vehicles.autopilots import AUTOPILOTS
-from quad_vehicles.mavlink_adapter import MavlinkAdapter
-from quad_vehicles.orders import Permissions
-from quad_vehicles.states import VehicleMachine
 from quad_vehicles.telemetry import Limits
-from quad_vehicles.vehicle_file import OUR_SYSTEM, Vehicle
+from quad_vehicles.vehicle_file import Vehicle
 
-BARE = {**BARE_AIRFRAMES, "crazyflie": CRAZYFLIE_AIRFRAME}
 TICK_STEPS = 6  # 25 ms, as in the node
 TIME_LIMIT_S, GROUND_LIMIT_S = 400.0, 60.0
 MOST_M, MOST_SHARE = 0.10, 1.10
@@ -54,21 +45,30 @@ LIMITS = Limits(speed_mps=1.0)
 JITTER_M = 0.3
 
 
-class Bridge:
-    """The bridge of one vehicle, its stand-in, and what goes between them."""
+class MissionBridge:
+    """The bridge of one vehicle, and where its odometry frame is in `map`."""
 
-    traits = crazyflie_adapter.TRAITS
-
-    def __init__(self, number, bodies, altitude_m):
+    def __init__(self, number, autopilot, bodies, seed, altitude_m):
         self.start = bodies.pose(number)
-        self.machine = VehicleMachine(altitude_m, LIMITS, self.traits, Permissions(may_arm=True))
+        kind = "crazyflie" if autopilot == "crazyflie" else "mavlink"
+        kinds = {} if kind == "crazyflie" else {"autopilot": autopilot, "has_radio": False}
+        file = Vehicle(number, kind, altitude_m=altitude_m, limits=LIMITS, **kinds)
+        heading_rad = math.remainder(0.7 * seed + 2.0 * number, math.tau)
+        frame = LocalFrame(3.0 * number, -2.0 * number, heading_rad)
+        self._bridge = bridge_of(file, bodies, number, 100 * seed + number, frame=frame)
+        self.vehicle, self.machine = self._bridge.vehicle, self._bridge.machine
+        self.receive = self._bridge.receive
         self.map_from_odom = Pose2D(0.0, 0.0).to_3d()
 
     def tick(self, now_s):
-        self.send(self.adapter.tick(now_s)[1])
+        self._deliver(self._bridge.adapter.tick(now_s)[1])
 
     def follow(self, twist, now_s):
-        self.send(self.adapter.follow(twist, now_s)[1])
+        self._deliver(self._bridge.adapter.follow(twist, now_s)[1])
+
+    def _deliver(self, messages):
+        for message in messages:
+            self._bridge.deliver(*message)
 
     def begin(self):
         """Fix the odometry frame in `map`: it stood at its start when it took off."""
@@ -77,58 +77,11 @@ class Bridge:
 
     def row(self):
         """Return the estimated state in `map`, float64[13]."""
-        estimate = self.adapter.estimate
+        estimate = self._bridge.adapter.estimate
         pose = self.map_from_odom.compose(estimate.odom_from_base)
         velocity = pose.rotation @ np.array(estimate.linear_mps)
         turn = pose.rotation @ np.array(estimate.angular_radps)
         return np.array([pose.x_m, pose.y_m, pose.z_m, *pose.quaternion, *velocity, *turn])
-
-
-class MavlinkBridge(Bridge):
-    """With MAVLink's messages."""
-
-    def __init__(self, number, autopilot, bodies, seed, altitude_m):
-        self.traits = AUTOPILOTS[autopilot].traits
-        super().__init__(number, bodies, altitude_m)
-        stand_in, safe = STAND_INS[autopilot]
-        heading_rad = 0.7 * seed + 2.0 * number
-        frame = LocalFrame(3.0 * number, -2.0 * number, math.remainder(heading_rad, math.tau))
-        self.vehicle = stand_in(bodies, number, frame, 100 * seed + number, 60.0, safe)
-        vehicle = Vehicle(
-            number, "mavlink", autopilot, altitude_m=altitude_m, limits=LIMITS, has_radio=False
-        )
-        self.adapter = MavlinkAdapter(vehicle, self.machine)
-
-    def receive(self, now_s):
-        for name, fields in self.vehicle.messages():
-            self.adapter.receive(name, 1, SimpleNamespace(**{"id": 0, **fields}), now_s)
-
-    def send(self, messages):
-        for name, fields in messages:
-            self.vehicle.receive(name, fields, (OUR_SYSTEM, 191))
-
-
-class CrazyflieBridge(Bridge):
-    """With log blocks and hover set-points; its local frame begins where it stands."""
-
-    def __init__(self, number, _autopilot, bodies, _seed, altitude_m):
-        super().__init__(number, bodies, altitude_m)
-        self.vehicle = Crazyflie(bodies, number)
-        vehicle = Vehicle(number, "crazyflie", altitude_m=altitude_m, limits=LIMITS)
-        self.adapter = crazyflie_adapter.CrazyflieAdapter(vehicle, self.machine)
-        self.adapter.connected(self.vehicle.parameters)
-        self._log = LogBlocks(self.vehicle)
-
-    def receive(self, now_s):
-        for block, stamp_ms, values in self._log.due(now_s):
-            self.adapter.receive(block, stamp_ms, values, now_s)
-
-    def send(self, calls):
-        for name, arguments in calls:
-            getattr(self.vehicle, name)(*arguments)
-
-
-BRIDGES = {"crazyflie": CrazyflieBridge}
 
 
 class VehicleSimulation(Simulation):
@@ -140,11 +93,10 @@ class VehicleSimulation(Simulation):
         Raises:
             AssertionError: One does not.
         """
-        self.bodies = Bodies(self.scene, self._starts, [BARE[autopilot]])
+        self.bodies = Bodies(self.scene, self._starts, [BARE_AIRFRAMES[autopilot]])
         altitude_m = self.scene.altitude_m
         self.bridges = [
-            BRIDGES.get(autopilot, MavlinkBridge)(k, autopilot, self.bodies, seed, altitude_m)
-            for k in range(self.n_robots)
+            MissionBridge(k, autopilot, self.bodies, seed, altitude_m) for k in range(self.n_robots)
         ]
         self.altitudes_m = []
         self._until(lambda machine: machine.state is State.READY)
@@ -280,7 +232,7 @@ def fly_simulated(seed, airframe):
 
 def main():
     flights = int(sys.argv[1]) if len(sys.argv) > 1 else 10
-    autopilots = sys.argv[2:] or list(BARE)
+    autopilots = sys.argv[2:] or list(BARE_AIRFRAMES)
     failed = 0
     for autopilot in autopilots:
         shares, good = {"arducopter": [], "default": []}, 0

@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from vehicles.point_vehicle import DELAY_S, LAG_S, YAW_LAG_S
-
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.sim.simulation_params import STEP_S
 
 GRAVITY_MPS2 = 9.81
+DELAY_S, LAG_S, YAW_LAG_S = 0.196, 0.449, 0.2
 _AT_ORIGIN = (Pose2D(0.0, 0.0),)
 _TOUCHING_M = 0.015
 _SHARE, _YAW_SHARE = 1.0 - math.exp(-STEP_S / LAG_S), 1.0 - math.exp(-STEP_S / YAW_LAG_S)

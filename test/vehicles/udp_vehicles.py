@@ -5,7 +5,7 @@ Each sends to its port on this machine, where a bridge listens (`address: udpin:
 North, east (m) and heading (degrees) are the vehicle's place in its own local frame. With a scene
 the vehicles stand at its start poses, and touch its walls and each other; contacts are printed.
 `--gcs-timeout` is how long ArduPilot waits for a silent ground station.
-KIND is `ardupilot` or `px4`, a stand-in with a simulated body, or `point`, a point without body.
+KIND is `ardupilot` or `px4`.
 The signal SIGUSR1 changes the mode of the first one, as its pilot would.
 """
 
@@ -22,10 +22,9 @@ from pathlib import Path
 os.environ["MAVLINK20"] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from pymavlink import mavutil
-from vehicles.bodies import AIRFRAME, EMPTY, Bodies
+from vehicles.bodies import EMPTY, Bodies
 from vehicles.estimator import LocalFrame
-from vehicles.point_vehicle import ARDUPILOT, PointVehicle
-from vehicles.stand_in import StandIn, advance
+from vehicles.stand_in import advance
 from vehicles.virtual_flight import AIRFRAMES, STAND_INS
 
 from quad_nav.geometry import Pose2D
@@ -43,15 +42,12 @@ class UdpVehicle:
     def __init__(self, text, bodies, number, gcs_timeout_s):
         kind, port, north, east, heading = text.split(":")
         place, heading_rad = (float(north), float(east)), math.radians(float(heading))
-        if kind in STAND_INS:
-            stand_in, safe = STAND_INS[kind]
-            if "SYSID_MYGCS" in safe:
-                station = float(OUR_SYSTEM - number)
-                safe = {**safe, "SYSID_MYGCS": station, "FS_GCS_TIMEOUT": gcs_timeout_s}
-            frame = LocalFrame(*place, heading_rad)
-            self.vehicle = stand_in(bodies, number, frame, number, BOOT_S, safe)
-        else:
-            self.vehicle = PointVehicle(ARDUPILOT, place, heading_rad, boot_s=BOOT_S)
+        stand_in, safe = STAND_INS[kind]
+        if "SYSID_MYGCS" in safe:
+            station = float(OUR_SYSTEM - number)
+            safe = {**safe, "SYSID_MYGCS": station, "FS_GCS_TIMEOUT": gcs_timeout_s}
+        frame = LocalFrame(*place, heading_rad)
+        self.vehicle = stand_in(bodies, number, frame, number, BOOT_S, safe)
         self._link = mavutil.mavlink_connection(
             f"udpout:127.0.0.1:{port}",
             source_system=1,
@@ -67,20 +63,11 @@ class UdpVehicle:
                 break
             fields = message.to_dict()
             sender = message.get_srcSystem(), message.get_srcComponent()
-            name = fields.pop("mavpackettype")
-            if isinstance(self.vehicle, StandIn):
-                self.vehicle.receive(name, fields, sender)
-            else:
-                self.vehicle.receive(name, fields)
+            self.vehicle.receive(fields.pop("mavpackettype"), fields, sender)
 
-    def step(self):
-        """Let a point take what has come, fly on, and send."""
-        self.receive()
-        self.send(self.vehicle.advance(STEP_S))
-
-    def send(self, messages):
-        """Send messages."""
-        for name, fields in messages:
+    def send(self):
+        """Send what the vehicle has to say."""
+        for name, fields in self.vehicle.messages():
             values = dict(fields)
             if "param_id" in values:
                 values["param_id"] = values["param_id"].encode()
@@ -106,8 +93,7 @@ def main():
     parser.add_argument("vehicles", nargs="+", metavar="KIND:PORT:NORTH:EAST:HEADING")
     options = parser.parse_args()
     count = len(options.vehicles)
-    kinds = [text.split(":")[0] for text in options.vehicles]
-    airframes = [AIRFRAMES.get(kind, AIRFRAME) for kind in kinds]
+    airframes = [AIRFRAMES[text.split(":")[0]] for text in options.vehicles]
     if options.scene:
         scene = load_scene(options.scene)
         bodies = Bodies(scene, scene.starts[:count], airframes)
@@ -120,20 +106,15 @@ def main():
         UdpVehicle(text, bodies, k, options.gcs_timeout) for k, text in enumerate(options.vehicles)
     ]
     vehicles = [link.vehicle for link in links]
-    stand_ins = [one for one in vehicles if isinstance(one, StandIn)]
     first, told = vehicles[0], 0
     signal.signal(signal.SIGUSR1, lambda *_: first.set_mode(first.kind["other"]))
     next_s = time.monotonic()
     while True:
         for link in links:
-            if link.vehicle in stand_ins:
-                link.receive()
-            else:
-                link.step()
-        advance(bodies, stand_ins, STEP_S)
+            link.receive()
+        advance(bodies, vehicles, STEP_S)
         for link in links:
-            if link.vehicle in stand_ins:
-                link.send(link.vehicle.messages())
+            link.send()
         for contact in bodies.contacts[told:]:
             print(contact, flush=True)
         told = len(bodies.contacts)

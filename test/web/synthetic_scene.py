@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, Dict, List, Tuple
 
 import numpy as np
 
+from quad_nav.sim.motion import Motion, Walkers
+from quad_nav.sim.obstacles import Box, Cylinder, Sphere
+from quad_nav.sim.scene import MovingObstacle, Scene, Walls
+from quad_web.view.items import scene_item
 from quad_web.view.state import Item
 
 Size = Tuple[float, float]
@@ -15,87 +20,19 @@ Size = Tuple[float, float]
 def scene(size_m: Size, centres: Any, has_obstacles: bool) -> Dict[str, Any]:
     """Return the item ``scene``: a pillar at each of float[n, 2] centres, and a few solids."""
     x_m, y_m = size_m
-
-    def box(
-        name: str,
-        x: float,
-        y: float,
-        sx: float,
-        sy: float,
-        height: float,
-        bottom: float = 0.0,
-        yaw: float = 0.0,
-    ) -> Dict[str, Any]:
-        return {
-            "kind": "box",
-            "x": x,
-            "y": y,
-            "bottom": bottom,
-            "height": height,
-            "size": [sx, sy],
-            "yaw": yaw,
-            "name": name,
-            "crosses": bottom <= 1.0 <= bottom + height,
-        }
-
-    pillars = [
-        {
-            "kind": "cylinder",
-            "x": float(x),
-            "y": float(y),
-            "bottom": 0.0,
-            "height": 1.6,
-            "radius": 0.35,
-            "yaw": 0.0,
-            "name": f"pillar{i}",
-            "crosses": True,
-        }
-        for i, (x, y) in enumerate(centres)
-    ]
-    return {
-        "size_m": [x_m, y_m],
-        "origin_m": [0.0, 0.0],
-        "altitude_m": 1.0,
-        "walls": [
-            box("wall_west", -0.05, y_m / 2, 0.1, y_m, 2.0),
-            box("wall_east", x_m + 0.05, y_m / 2, 0.1, y_m, 2.0),
-            box("wall_south", x_m / 2, -0.05, x_m + 0.2, 0.1, 2.0),
-            box("wall_north", x_m / 2, y_m + 0.05, x_m + 0.2, 0.1, 2.0),
-        ],
-        "moving": moving() if has_obstacles else [],
-        "solids": [
-            *pillars,
-            box("table", 1.2, 1.0, 1.2, 0.8, 0.5),
-            box("beam", x_m - 2.0, 1.0, 2.0, 0.2, 0.2, bottom=1.8, yaw=0.5),
-            {
-                "kind": "sphere",
-                "x": 1.0,
-                "y": y_m - 1.0,
-                "bottom": 0.7,
-                "height": 0.6,
-                "radius": 0.3,
-                "yaw": 0.0,
-                "name": "ball",
-                "crosses": True,
-            },
-        ],
-    }
-
-
-def moving() -> List[Dict[str, Any]]:
-    """Return a cart and a person, wherever they are."""
-    standing = {"x": 0.0, "y": 0.0, "bottom": 0.0, "yaw": 0.0, "crosses": True}
-    return [
-        {**standing, "kind": "box", "name": "cart", "size": [0.9, 0.5], "height": 1.2},
-        {
-            **standing,
-            "kind": "cylinder",
-            "name": "person_0",
-            "radius": 0.25,
-            "height": 1.75,
-            "person": True,
-        },
-    ]
+    pillars = [Cylinder(f"pillar{i}", x, y, 0.35, 1.6) for i, (x, y) in enumerate(centres.tolist())]
+    solids = (
+        *pillars,
+        Box("table", 1.2, 1.0, 1.2, 0.8, 0.5),
+        Box("beam", x_m - 2.0, 1.0, 2.0, 0.2, 0.2, bottom_m=1.8, yaw_rad=0.5),
+        Sphere("ball", 1.0, y_m - 1.0, 1.0, 0.3),
+    )
+    made_up = Scene("made up", x_m, y_m, 1.0, Walls(), solids, ())
+    if has_obstacles:
+        cart = Box("cart", 0.0, 0.0, 0.9, 0.5, 1.2)
+        moving = (MovingObstacle(cart, Motion((0.0,), ((0.0, 0.0, 0.0),))),)
+        made_up = replace(made_up, moving=moving, walkers=Walkers(1))
+    return scene_item(made_up).data
 
 
 def obstacles(size_m: Size, time_s: float) -> Item:

@@ -13,9 +13,9 @@ from quad_nav.api.result import FlightResult, TrajectoryObserver
 from quad_nav.config import Configuration, updated
 from quad_nav.geometry import Pose2D, Scan, Twist2D
 from quad_nav.loop.flight_loop import STEPS_PER_ODOMETRY
-from quad_nav.mission.summary import summarize
 from quad_nav.navigator.tick import Tick
 from quad_nav.offline import flight as offline
+from quad_nav.offline.run import summary_of
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.flight import BodyState
@@ -197,18 +197,10 @@ class Flight:
 
     def result(self) -> FlightResult:
         """Return summary and trajectories of the flight so far, also after ``close``."""
-        loop = self._loop
-        limit_s = loop.setup.time_limit_s
-        late = loop.now_s >= limit_s and not loop.is_done
-        summary = summarize(
-            loop.log,
-            {robot.name: robot.sequencer for robot in loop.robots},
-            loop.now_s,
-            sim_time_s=loop.now_s,
-            wall_time_s=time.perf_counter() - self._start_wall_s,
-            reason=f"time limit of {limit_s:g} s" if late else "",
-            seed=loop.setup.seed,
-        )
+        loop, limit_s = self._loop, self._loop.setup.time_limit_s
+        is_late = loop.now_s >= limit_s and not loop.is_done
+        reason = f"time limit of {limit_s:g} s" if is_late else ""
+        summary = summary_of(loop, reason, time.perf_counter() - self._start_wall_s)
         return FlightResult(summary, self._record.trajectories())
 
     def close(self) -> None:

@@ -7,8 +7,8 @@ from typing import Any, Dict
 
 import click
 
-EXTRAS: Dict[str, str] = {"quad_bench": "orca", "quad_tune": "tune", "quad_web": "web"}
-"""Package with commands -> extra of pip that installs what it needs."""
+EXTRAS: Dict[str, str] = {"quad_bench": "", "quad_tune": "[tune]", "quad_web": "[web]"}
+"""Package with commands -> extra of pip that installs what it needs, "" for none."""
 
 
 def load(module: str, wanted: str) -> Any:
@@ -31,5 +31,5 @@ def load(module: str, wanted: str) -> Any:
         package = missing if missing in EXTRAS else module.partition(".")[0]
         raise click.ClickException(
             f"{wanted}: {missing} is not installed; expected it from "
-            f"pip install 'quad-nav[{EXTRAS[package]}]'"
+            f"pip install 'quad-nav{EXTRAS[package]}'"
         ) from error

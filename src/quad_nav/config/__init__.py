@@ -8,7 +8,7 @@
 
 Parameters are declared in the dataclasses of their owners, see ``quad_nav.parameter``. Reading
 order: ``reader`` (the parameters of a namespace, and its check), ``costmaps``,
-``layers``, ``planners``, ``local_planners``, ``recoveries`` and ``fixes`` (namespaces to
+``layers``, ``planners``, ``filters``, ``recoveries`` and ``fixes`` (namespaces to
 dataclasses), ``configuration`` (the whole), ``reconfiguration`` (changes in flight), ``files``,
 ``file_sets`` and ``robot_tree`` (YAML), ``check`` (the report of ``quad check``), ``plugins``
 (classes of users), ``reference`` (generates ``docs/parameters.md``).

@@ -23,7 +23,6 @@ from quad_nav.errors import InputError, printable
 _COSTMAPS = ("global_costmap/", "local_costmap/")
 _BOTH = "*_costmap/"
 _GAP = 2  # characters between the columns of a table
-_ROOM = 50  # least characters of parameter and message beside a column of nearest names
 
 
 @dataclass(frozen=True)
@@ -123,16 +122,10 @@ def report_text(report: Report, width: int = 100) -> str:
     """Format a report with its heading and files, in at most ``width`` columns."""
     files = report.files
     names = ", ".join(_seen_from(_root(files), str(file.path)) for file in files.files)
+    fill = textwrap.TextWrapper(width, "  ", "  ", break_long_words=False, break_on_hyphens=False)
     parts = [
         f"{printable(_title(files))}: {counts([report])}",
-        textwrap.fill(
-            printable(names),
-            width,
-            initial_indent="  ",
-            subsequent_indent="  ",
-            break_long_words=False,
-            break_on_hyphens=False,
-        ),
+        fill.fill(printable(names)),
     ]
     if report.lines:
         parts.append("\n" + table(report.lines, _root(files), width))
@@ -149,44 +142,27 @@ def counts(reports: Sequence[Report]) -> str:
 
 
 def table(lines: Sequence[Remark], root: str, width: int) -> str:
-    """Format faults and remarks as a table.
-
-    The columns are place, kind, text, and the nearest known name if it fits.
+    """Format faults and remarks as a table of place, kind and text.
 
     Args:
         lines: The faults and remarks.
         root: Folder that paths of files are relative to.
         width: Width of the table in characters.
     """
-    header = ["parameter", "kind", "message", "nearest name"]
-    kinds = _widest(header[1], [line.kind for line in lines])
-    nearest = _widest(header[3], [line.nearest for line in lines])
-    left = width - kinds - nearest - 3 * _GAP
-    with_nearest = left >= _ROOM and any(line.nearest for line in lines)
-    if not with_nearest:
-        left += nearest + _GAP
-        lines = [
-            replace(line, text=line.text + f"; did you mean {line.nearest}?")
-            if line.nearest
-            else line
-            for line in lines
-        ]
-    whats = _widest(header[2], [_what(line) for line in lines])
+    header = ["parameter", "kind", "message"]
+    left = width - _widest(header[1], [line.kind for line in lines]) - 2 * _GAP
+    texts = _widest(header[2], [_what(line) for line in lines])
     places = _widest(header[0], [part for line in lines for part in _place(line, root, left)])
     # The column is at least as wide as its longest piece, then as wide as fits.
-    place = min(places, max(left // 2, left - whats))
+    place = min(places, max(left // 2, left - texts))
     for _ in range(2):
         cells = [_place(line, root, place) for line in lines]
         place = _widest(header[0], [part for cell in cells for part in cell])
-    left -= place
     rows = [
-        ["\n".join(cell), line.kind, textwrap.fill(_what(line), max(left, 20)), line.nearest]
+        ["\n".join(cell), line.kind, textwrap.fill(_what(line), max(left - place, 20))]
         for cell, line in zip(cells, lines)
     ]
-    columns = 4 if with_nearest else 3
-    return tabulate.tabulate(
-        [row[:columns] for row in rows], header[:columns], tablefmt="simple", disable_numparse=True
-    )
+    return tabulate.tabulate(rows, header, tablefmt="simple", disable_numparse=True)
 
 
 def _widest(header: str, cells: Sequence[str]) -> int:
@@ -212,10 +188,11 @@ def _wrapped_path(path: str, width: int) -> List[str]:
 
 def _what(line: Remark) -> str:
     """Return the text without its kind, which has a column of its own."""
+    text = line.text + (f"; did you mean {line.nearest}?" if line.nearest else "")
     for prefix in (f"{line.kind}: ", f"{line.kind} parameter, ", f"{line.kind} by move_base: "):
-        if line.text.startswith(prefix):
-            return line.text[len(prefix) :]
-    return line.text
+        if text.startswith(prefix):
+            return text[len(prefix) :]
+    return text
 
 
 def _merged(lines: Sequence[Remark]) -> List[Remark]:
@@ -224,13 +201,10 @@ def _merged(lines: Sequence[Remark]) -> List[Remark]:
     for line in lines:
         place = line.place.lstrip("/")
         costmap = next((name for name in _COSTMAPS if place.startswith(name) and line.origin), "")
-        general = (
-            replace(
-                line, place=_BOTH + place[len(costmap) :], text=line.text.replace(costmap, _BOTH)
-            )
-            if costmap
-            else line
-        )
+        general = line
+        if costmap:
+            text = line.text.replace(costmap, _BOTH)
+            general = replace(line, place=_BOTH + place[len(costmap) :], text=text)
         key = (general.place, general.kind, general.text, general.origin)
         if key not in merged:
             merged[key] = line

@@ -12,6 +12,7 @@ from quad_nav.config.costmaps import (
     normalise_costmap,
     remark_on_blindness,
 )
+from quad_nav.config.files import COSTMAPS, below
 from quad_nav.config.filters import (
     COMMAND_FILTERS,
     SCAN_FILTERS,
@@ -31,7 +32,7 @@ from quad_nav.config.planners import (
     normalise_planners,
     planner_keys,
     planner_params,
-    planner_type,
+    planner_table,
 )
 from quad_nav.config.plugins import plugin_name
 from quad_nav.config.reader import Table, made, normalise
@@ -54,7 +55,6 @@ from quad_nav.navigator.params import NavigatorParams
 from quad_nav.parameter import POSITIVE, fixed_flag, fixed_number, fixed_whole
 from quad_nav.peers.peer_params import PeerParams
 
-COSTMAPS = ("global_costmap", "local_costmap")
 # Costmaps look for these upwards too, to the node's level.
 _INHERITED = ("footprint", "robot_radius", "obstacle_range", "raytrace_range")
 
@@ -136,9 +136,9 @@ def tables_of(tree: Mapping[str, Any]) -> Iterator[Tuple[str, Table, Mapping[str
     """
     tables = {"": MOVE_BASE_TABLE}
     for key in SLOTS:
-        planner = planner_type(tree, key) if key in tree else None
+        planner = planner_table(tree, key) if key in tree else None
         if planner is not None:
-            tables[plugin_name(tree[key])] = planner.table
+            tables[plugin_name(tree[key])] = planner
     for costmap in COSTMAPS:
         tables[costmap] = COSTMAP_TABLE
         for plugin in below(tree, costmap).get("plugins", ()):
@@ -152,14 +152,6 @@ def tables_of(tree: Mapping[str, Any]) -> Iterator[Tuple[str, Table, Mapping[str
             tables[entry["name"]] = TABLES[full_type(entry["type"])]
     for path, table in {**tables, **GROUPS}.items():
         yield path, table, below(tree, path)
-
-
-def below(tree: Mapping[str, Any], path: str) -> Any:
-    """Return the namespace at a path, {} if there is none."""
-    for name in filter(None, path.split("/")):
-        found = tree.get(name)
-        tree = found if isinstance(found, dict) else {}
-    return tree
 
 
 def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
@@ -232,19 +224,12 @@ def navigator_params(
 ) -> NavigatorParams:
     """Make the dataclass of a normalised tree.
 
-    Args:
-        tree: The normalised tree.
-        listed: (name, type) of the ``recovery_behaviors``, None without that list.
-        given: The keys that were set.
+    ``listed`` has (name, type) of the ``recovery_behaviors``, None without that list; ``given``
+    the keys that were set.
     """
-    params = made(
-        NavigatorParams,
-        tree,
-        given,
-        recovery_behaviors=listed,
-        progress=own_params(ProgressParams, tree),
-    )
-    return with_fixes(params, tree)
+    progress = own_params(ProgressParams, tree)
+    found = made(NavigatorParams, tree, given, recovery_behaviors=listed, progress=progress)
+    return with_fixes(found, tree)
 
 
 def own_parts(tree: Mapping[str, Any]) -> Dict[str, Any]:
@@ -288,12 +273,9 @@ def _remark_on_rates(tree: Mapping[str, Any], notes: Notes) -> None:
     own_hz = local_planner_frequency(tree)
     loop_hz = tree["controller_frequency"]
     if own_hz is not None and own_hz != loop_hz:
-        planner = plugin_name(tree["base_local_planner"])
-        notes.remark(
-            join(planner, "controller_frequency"),
-            CAUTION,
-            f"rollouts assume {own_hz} Hz, but the control loop runs at {loop_hz} Hz",
-        )
+        place = join(plugin_name(tree["base_local_planner"]), "controller_frequency")
+        text = f"rollouts assume {own_hz} Hz, but the control loop runs at {loop_hz} Hz"
+        notes.remark(place, CAUTION, text)
 
 
 def _without_empty(tree: Mapping[str, Any]) -> Dict[str, Any]:

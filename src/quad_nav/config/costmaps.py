@@ -28,13 +28,7 @@ _OLD_STYLE = ("static_map", "map_type")
 
 
 def normalise_costmap(tree: Namespace, name: str, notes: Notes) -> None:
-    """Normalise a costmap's namespace as move_base does.
-
-    Args:
-        tree: The node's tree; the costmap inherits footprint and ranges from it.
-        name: ``global_costmap`` or ``local_costmap``.
-        notes: Receives faults and remarks.
-    """
+    """Normalise a costmap's namespace as move_base does; it inherits from the node's ``tree``."""
     costmap = subtree(tree, name, "", notes)
     _normalise_footprint(costmap, name, tree, notes)
     is_old_style = "plugins" not in costmap
@@ -77,11 +71,8 @@ def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:
         and layer.sources
         for _, layer in params.layers
     ):
-        notes.remark(
-            name,
-            CAUTION,
-            "no map and no observation_sources: this costmap never has obstacles",
-        )
+        text = "no map and no observation_sources: this costmap never has obstacles"
+        notes.remark(name, CAUTION, text)
 
 
 def _normalise_footprint(costmap: Namespace, name: str, tree: Namespace, notes: Notes) -> None:
@@ -96,9 +87,8 @@ def _normalise_footprint(costmap: Namespace, name: str, tree: Namespace, notes: 
         polygon = polygon_from_list(costmap["footprint"])
     except ValueError as error:
         expected = COSTMAP_TABLE["footprint"].expected
-        notes.problem(
-            join(name, "footprint"), f"{costmap['footprint']}: {error}; expected {expected}"
-        )
+        text = f"{costmap['footprint']}: {error}; expected {expected}"
+        notes.problem(join(name, "footprint"), text)
         polygon = None
     costmap["footprint"] = "[]" if polygon is None else text_from_polygon(polygon)
 
@@ -107,10 +97,8 @@ def _normalise_old_style(costmap: Namespace, name: str, notes: Notes) -> None:
     """Add the plugins list to a costmap without one, and move the layers' parameters."""
     static_map = costmap.get("static_map", False)
     if not isinstance(static_map, bool):
-        notes.problem(
-            join(name, "static_map"),
-            f"{static_map!r} is not a boolean; expected true or false",
-        )
+        text = f"{static_map!r} is not a boolean; expected true or false"
+        notes.problem(join(name, "static_map"), text)
     plugins = _old_style_layers(costmap)
     for layer, layer_type in plugins:
         keys = list(PARENT_PARAMETERS[layer_type])
@@ -147,17 +135,10 @@ def _copy_parent_parameters(
     costmap: Namespace, name: str, layer: str, layer_type: str, notes: Notes
 ) -> None:
     for key in PARENT_PARAMETERS.get(layer_type, ()):
-        below = costmap.get(layer)
-        if (
-            key in costmap
-            and isinstance(below, dict)
-            and below.get(key, costmap[key]) != (costmap[key])
-        ):
-            notes.remark(
-                join(name, layer, key),
-                IGNORED,
-                f"ignored by move_base: {join(name, key)} overrides it",
-            )
+        own = costmap.get(layer)
+        if isinstance(own, dict) and key in costmap and own.get(key, costmap[key]) != costmap[key]:
+            text = f"ignored by move_base: {join(name, key)} overrides it"
+            notes.remark(join(name, layer, key), IGNORED, text)
         _move(costmap, name, layer, key, notes, keep=True)
 
 
@@ -177,12 +158,9 @@ def _checked_plugins(costmap: Namespace, name: str, notes: Notes) -> List[Tuple[
     plugins = named_types(costmap["plugins"], place, "a layer", notes)
     for layer, layer_type in plugins.items():
         if layer_type not in LAYERS and not is_dotted(layer_type):
-            notes.remark(
-                join(place, layer),
-                UNSUPPORTED,
-                f"{layer_type} is not supported, skipping this layer; expected one of"
-                f" {', '.join(sorted(LAYERS))}",
-            )
+            expected = ", ".join(sorted(LAYERS))
+            text = f"{layer_type} is not supported, skipping this layer; expected one of {expected}"
+            notes.remark(join(place, layer), UNSUPPORTED, text)
     return list(plugins.items())
 
 

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Dict, Iterator, Mapping, Tuple
+import json
+import re
+from dataclasses import dataclass, replace
+from typing import Any, Dict, Iterator, List, Mapping, Tuple
 
-from quad_nav.config.configuration import COSTMAPS, below, tables_of
-from quad_nav.config.files import ParameterTree, set_value
+from quad_nav.config.configuration import tables_of
+from quad_nav.config.files import COSTMAPS, ParameterTree, below, set_value
 from quad_nav.config.notes import join
 from quad_nav.config.reader import Table
 from quad_nav.config.recoveries import CLEAR, TABLES
+
+Trees = Mapping[str, Mapping[str, Any]]
+"""Robot's name -> its tree of ``Configuration.to_tree``; an empty tree is unknown."""
 
 
 @dataclass(frozen=True)
@@ -73,3 +78,82 @@ def _default_recoveries(tree: Mapping[str, Any]) -> Iterator[Tuple[str, Table, M
     if "recovery_behaviors" not in tree:
         for name in ("conservative_reset", "aggressive_reset"):
             yield name, TABLES[CLEAR], below(tree, name)
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """Row of the report's table.
+
+    ``robots`` is empty if the row holds for all robots. ``{i}`` in a value stands for the robot's
+    number, ``*_costmap`` in a path for both costmaps.
+    """
+
+    path: str
+    value: str
+    default: str
+    unit: str
+    robots: str = ""
+
+
+def parameter_rows(trees: Trees) -> Tuple[ParameterRow, ...]:
+    """Build the rows; costmaps with equal values share one, and so do robots."""
+    rows = [
+        ParameterRow(
+            entry["parameter"],
+            number_text(entry["value"]),
+            number_text(entry["default"]),
+            entry["unit"],
+            ", ".join(entry["robots"] or ()),
+        )
+        for entry in difference_list(trees)
+    ]
+    own, other = (f"{name}/" for name in COSTMAPS)
+    common = []
+    for row in rows:
+        _, is_twin, rest = row.path.partition("_costmap/")
+        twins = {replace(row, path=costmap + rest) for costmap in (own, other)}
+        if not is_twin or not twins <= set(rows):
+            common.append(row)
+        elif row.path.startswith(own):
+            common.append(replace(row, path="*_costmap/" + rest))
+    return tuple(common)
+
+
+def difference_list(trees: Trees) -> List[Dict[str, Any]]:
+    """Return the differences as JSON objects with their exact values.
+
+    Each has ``parameter``, ``value``, ``default``, ``unit`` and the ``robots`` that it holds for,
+    None for all. ``{i}`` in a text stands for the robot's number.
+    """
+    found: Dict[str, Dict[str, Any]] = {}
+    known = [name for name, tree in trees.items() if tree]
+    for name in known:
+        for entry in differences(trees[name]):
+            fields = {
+                "parameter": entry.path,
+                "value": _numbered(entry.value, name),
+                "default": entry.default,
+                "unit": entry.unit,
+            }
+            key = json.dumps(fields, default=str)
+            found.setdefault(key, {**fields, "robots": []})["robots"].append(name)
+    for fields in found.values():
+        fields["robots"] = fields["robots"] if len(fields["robots"]) < len(known) else None
+    return list(found.values())
+
+
+def number_text(value: Any) -> str:
+    """Return a parameter's value as text."""
+    if value is None:
+        return "unset"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:g}" if isinstance(value, float) else str(value) or '""'
+
+
+def _numbered(value: Any, robot: str) -> Any:
+    """Replace the robot's number in names such as ``odom0`` by ``{i}``."""
+    number = "".join(re.findall(r"\d+$", robot))
+    if not number or not isinstance(value, str):
+        return value
+    return re.sub(rf"(?<=[A-Za-z_]){number}\b", "{i}", value)

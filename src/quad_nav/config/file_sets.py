@@ -13,30 +13,30 @@ from __future__ import annotations
 import itertools
 import os
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Set, Tuple
 
 from quad_nav.config.configuration import MOVE_BASE_TABLE
 from quad_nav.config.costmaps import COSTMAP_TABLE
 from quad_nav.config.files import (
+    COSTMAPS,
     OPTIONAL,
     REQUIRED,
     PlacedFile,
     costmaps_named,
     files_of,
     leaves,
-    top_level,
+    read_file,
 )
 from quad_nav.config.layers import LAYERS
 from quad_nav.config.planners import SLOTS, planner_keys
 from quad_nav.errors import InputError
 
-_COSTMAPS = ("global_costmap", "local_costmap")
 _OF_NODE = {parameter.name for parameter in MOVE_BASE_TABLE.parameters} | {
     "recovery_behaviors",
     *planner_keys({}),
-    *_COSTMAPS,
+    *COSTMAPS,
 }
 _OF_COSTMAP = {
     parameter.name
@@ -131,8 +131,9 @@ def file_sets(
             used = {file.path for file_set in standard for file in file_set.files}
             left += [path for path in paths if path not in used]
             continue
-        known = _known(paths, number or "0")
-        left += [path for path in paths if path not in {one.file.path for one in known}]
+        placed = [_placed(path, number or "0") for path in paths]
+        known = [one for one in placed if one is not None]
+        left += [path for path, one in zip(paths, placed) if one is None]
         inherited = next((above[parent] for parent in folder.parents if parent in above), [])
         if known:
             above[folder] = inherited + known
@@ -174,11 +175,7 @@ def standard_set(folder: Path, number: str, name: str = "") -> FileSet:
     Raises:
         InputError: One of them is missing.
     """
-    files = tuple(
-        PlacedFile(path, _COSTMAPS if path.name.startswith(REQUIRED[0]) else ("",))
-        for path in files_of(folder, number)
-    )
-    return FileSet(folder, name, files, number)
+    return FileSet(folder, name, tuple(files_of(folder, number)), number)
 
 
 def _numbers(folder: Path) -> List[str]:
@@ -198,52 +195,38 @@ def _standard_sets(folder: Path, number: Optional[str]) -> List[FileSet]:
     return sets
 
 
-def _known(paths: Sequence[Path], number: str) -> List[_KnownFile]:
-    known = []
-    for path in paths:
-        placed = _placed(path, number)
-        if placed is not None:
-            known.append(placed)
-    return known
-
-
 def _placed(path: Path, number: str) -> Optional[_KnownFile]:
     """Classify a file by name and content; None if it is not one of move_base."""
     named = costmaps_named(path)
     try:
-        values = top_level(path, {"i": number})
-        found = leaves(path, {"i": number})
+        tree = read_file(path, {"i": number})
     except InputError:  # check_set reports its faults
         by_name = named or "move_base" in path.stem or "planner" in path.stem
-        return _known_file(path, named, {path.stem}, {}) if by_name else None
-    keys = set(values)
-    costmaps = tuple(name for name in _COSTMAPS if name in keys)
+        return _known_file(path, named, {path.stem}) if by_name else None
+    keys, found = set(tree), dict(leaves(tree))
+    costmaps = tuple(name for name in COSTMAPS if name in keys)
     if costmaps:
-        kind = _kind_of(costmaps if keys == set(costmaps) else (), keys)
-        return _KnownFile(PlacedFile(path, ("",)), kind, found)
+        meant = costmaps if keys == set(costmaps) else ()
+        return replace(_known_file(path, meant, keys, found), file=PlacedFile(path, ("",)))
     if not named and not keys & _OF_NODE:
         if not keys & (_OF_COSTMAP if "costmap" in path.stem else _OF_COSTMAP_ONLY):
             return None
-        named = _costmaps_meant(values)
+        named = _costmaps_meant(tree)
     return _known_file(path, named, keys, found)
 
 
 def _known_file(
-    path: Path, costmaps: Tuple[str, ...], keys: Set[str], found: Mapping[str, Any]
+    path: Path, costmaps: Tuple[str, ...], keys: Set[str], found: Mapping[str, Any] = {}
 ) -> _KnownFile:
-    return _KnownFile(PlacedFile(path, costmaps or ("",)), _kind_of(costmaps, keys), found)
-
-
-def _kind_of(costmaps: Tuple[str, ...], keys: Set[str]) -> Kind:
-    if not costmaps:
-        return (_NODE, (), tuple(sorted(keys)))
-    return (_COMMON if len(costmaps) > 1 else _ONE_COSTMAP, costmaps, ())
+    order = _NODE if not costmaps else _COMMON if len(costmaps) > 1 else _ONE_COSTMAP
+    kind = (order, costmaps, () if costmaps else tuple(sorted(keys)))
+    return _KnownFile(PlacedFile(path, costmaps or ("",)), kind, found)
 
 
 def _costmaps_meant(values: Mapping[str, Any]) -> Tuple[str, ...]:
     """Guess the costmaps of a file from its content: the rolling one is the local costmap."""
     if not _OF_ONE_COSTMAP.intersection(values):
-        return _COSTMAPS
+        return COSTMAPS
     return ("local_costmap",) if values.get("rolling_window") is True else ("global_costmap",)
 
 

@@ -11,11 +11,23 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import (
+    Any,
+    Dict,
+    Iterable,
+    Iterator,
+    List,
+    Mapping,
+    Optional,
+    Sequence,
+    Tuple,
+    Union,
+    cast,
+)
 
 import yaml
 
-from quad_nav.config.notes import CAUTION, Remark
+from quad_nav.config.notes import CAUTION, Remark, join
 from quad_nav.errors import MAX_PROBLEMS, InputError
 from quad_nav.files.document import MAX_TEXT_LENGTH, yaml_fault
 from quad_nav.files.plain_yaml import MAX_BYTES, MAX_LEVELS, PlainLoader
@@ -60,6 +72,28 @@ class ParameterTree(Dict[str, Any]):
         self.origins: Dict[str, str] = {}
         self.remarks: List[Remark] = []
 
+    def at(self, path: str) -> ParameterTree:
+        """Return the namespace at a path as a tree of its own."""
+        tree = ParameterTree()
+        tree.update(below(self, path))
+        start = f"{path}/"
+        tree.origins = {
+            place[len(start) :]: origin
+            for place, origin in self.origins.items()
+            if place.startswith(start)
+        }
+        tree.remarks = self.remarks
+        return tree
+
+
+def below(tree: Mapping[str, Any], path: str) -> Dict[str, Any]:
+    """Return the namespace at a path, {} if there is none."""
+    namespace: Any = tree
+    for name in filter(None, path.split("/")):
+        found = namespace.get(name)
+        namespace = found if isinstance(found, dict) else {}
+    return cast(Dict[str, Any], namespace)
+
 
 def load_files(
     source: Union[str, Path, Sequence[FileName]], substitutions: Optional[Mapping[str, str]] = None
@@ -76,83 +110,54 @@ def load_files(
         InputError: One line for every file that is missing or cannot be read.
     """
     arguments = {} if substitutions is None else dict(substitutions)
+    if isinstance(source, (str, Path)):
+        source = files_of(Path(source), arguments.get("i"))
     tree = ParameterTree()
     problems: List[str] = []
-    for file in placed_files(source, arguments):
+    for name in source:
+        file = name if isinstance(name, PlacedFile) else PlacedFile(Path(name), ())
         try:
-            document = _read(file.path, arguments)
+            content = read_file(file.path, arguments)
         except InputError as error:
             problems.extend(error.problems)
-            continue
-        for namespace in file.namespaces or _namespaces(document):
-            _merge(tree, document, namespace)
-        for line, key in document.duplicates:
-            tree.remarks.append(
-                Remark(key, CAUTION, "set twice; YAML uses the last value", f"{file.path}:{line}")
-            )
+        else:
+            merge_tree(tree, content, *(file.namespaces or _namespaces(file.path, content)))
     if problems:
         raise InputError(problems)
     return tree
 
 
-def merge_tree(tree: ParameterTree, other: ParameterTree) -> None:
-    """Merge another tree key by key; ``tree`` is changed in place."""
-    _merge_namespace(tree, other)
-    tree.origins.update(other.origins)
+def read_file(path: Path, arguments: Mapping[str, str]) -> ParameterTree:
+    """Read a file, or the part of a dump of a parameter server that is this robot's.
+
+    Raises:
+        InputError: The file cannot be read, or is not YAML; with the line.
+    """
+    text = _substituted(read_text(path, MAX_BYTES), path, arguments)
+    return _tree_of_node(parsed(text, path), f"move_base{arguments.get('i', '')}")
+
+
+def merge_tree(tree: ParameterTree, other: ParameterTree, *namespaces: str) -> None:
+    """Merge another tree key by key into the top of a tree, or into each of some namespaces."""
+    for namespace in namespaces or ("",):
+        if other:
+            _merge(_namespace(tree, namespace.split("/")), other)
+        for path, origin in other.origins.items():
+            tree.origins[join(namespace, path)] = origin
     tree.remarks += other.remarks
 
 
-def _merge_namespace(namespace: Dict[str, Any], other: Mapping[str, Any]) -> None:
+def _merge(namespace: Dict[str, Any], other: Mapping[str, Any]) -> None:
     for key, value in other.items():
-        if isinstance(value, dict) and isinstance(namespace.get(key), dict):
-            _merge_namespace(namespace[key], value)
-        elif isinstance(value, dict) and (value or key not in namespace):
-            namespace[key] = {}
-            _merge_namespace(namespace[key], value)
-        elif not isinstance(value, dict):
+        if isinstance(value, dict):
+            _merge(_namespace(namespace, [key]), value)
+        else:
             namespace[key] = value
-
-
-def merge_text(tree: ParameterTree, text: str, path: Path, namespace: str) -> None:
-    """Load YAML into a namespace; ``path`` is the file that has it, for messages.
-
-    Raises:
-        InputError: The text is not YAML.
-    """
-    document = _parsed(text, path)
-    _merge(tree, document, namespace)
-    for line, key in document.duplicates:
-        tree.remarks.append(
-            Remark(key, CAUTION, "set twice; YAML uses the last value", f"{path}:{line}")
-        )
-
-
-def placed_files(
-    source: Union[str, Path, Sequence[FileName]],
-    arguments: Mapping[str, str],
-    numbered: bool = False,
-) -> List[PlacedFile]:
-    """List the files of a robot with their namespaces, in the order of loading.
-
-    Args:
-        source: As for ``load_files``.
-        arguments: As for ``load_files``.
-        numbered: Use only files of a folder that have the robot's number in their names.
-
-    Raises:
-        InputError: The folder or one of its four files is missing.
-    """
-    if isinstance(source, (str, Path)):
-        return [
-            PlacedFile(path, COSTMAPS if path.name.startswith(COMMON) else ("",))
-            for path in files_of(Path(source), arguments.get("i"), numbered)
-        ]
-    return [file if isinstance(file, PlacedFile) else PlacedFile(Path(file), ()) for file in source]
 
 
 def set_value(tree: ParameterTree, path: str, value: Any, origin: str) -> None:
     """Set one parameter as a file loaded last does; ``path`` is like ``global_costmap/width``."""
-    keys = tuple(key for key in path.split("/") if key)
+    keys = [key for key in path.split("/") if key]
     _namespace(tree, keys[:-1])[keys[-1]] = value
     tree.origins["/".join(keys)] = origin
 
@@ -162,62 +167,44 @@ def is_overlay(path: Path) -> bool:
     return path.is_file() and (path.parent / BASE / f"{COMMON}.yaml").is_file()
 
 
-def files_of(folder: Path, number: Optional[str] = None, numbered: bool = False) -> List[Path]:
+def files_of(folder: Path, number: Optional[str] = None) -> List[PlacedFile]:
     """List the files of a robot in a folder, in the order of loading.
 
     Args:
         folder: The folder, or an overlay on the one called ``default`` beside it.
         number: Number of the robot.
-        numbered: Use only files with the robot's number in their names.
 
     Raises:
         InputError: The folder or one of the four files is missing.
     """
     if is_overlay(folder):
-        return [*files_of(folder.parent / BASE, number, numbered), folder]
+        return [*files_of(folder.parent / BASE, number), PlacedFile(folder, ("",))]
     if not folder.is_dir():
         raise InputError([f"{folder}: no such folder; expected a folder with {REQUIRED[0]}.yaml"])
-    paths: List[Path] = []
+    files: List[PlacedFile] = []
     problems: List[str] = []
     for stem in REQUIRED + OPTIONAL:
         plain = folder / f"{stem}.yaml"
         names = [plain] if number is None else [folder / f"{stem}{number}.yaml", plain]
-        accepted = names[:1] if numbered else names
-        found = [path for path in accepted if path.is_file()]
+        found = [path for path in names if path.is_file()]
         if found:
-            paths.append(found[0])
+            files.append(PlacedFile(found[0], COSTMAPS if stem == COMMON else ("",)))
         elif stem in REQUIRED:
-            expected = " or ".join(sorted(path.name for path in accepted))
+            expected = " or ".join(sorted(path.name for path in names))
             problems.append(f"{folder}: missing {expected}")
     if problems:
         raise InputError(problems)
     own = folder / f"robot{number}.yaml"
-    return paths + [own] if own.is_file() else paths
+    return files + [PlacedFile(own, ("",))] if own.is_file() else files
 
 
-def top_level(path: Path, substitutions: Mapping[str, str]) -> Dict[str, Any]:
-    """Return the names and values at a file's top level; a namespace is ``{}``.
-
-    Raises:
-        InputError: The file cannot be read.
-    """
-    document = _read(path, substitutions)
-    values = {path[0]: value for path, value in document.values if len(path) == 1}
-    return {key: values.get(key, {}) for key in document.keys}
-
-
-def leaves(path: Path, substitutions: Mapping[str, str]) -> Dict[str, Any]:
-    """Return path -> value of every parameter in a file.
-
-    Raises:
-        InputError: The file cannot be read.
-    """
-    document = _read(path, substitutions)
-    return {
-        "/".join(names): value
-        for names, value in document.values
-        if not isinstance(value, dict) or value
-    }
+def leaves(tree: Mapping[str, Any], above: str = "") -> Iterator[Tuple[str, Any]]:
+    """Yield (path, value) of every parameter of a tree."""
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            yield from leaves(value, join(above, key))
+        else:
+            yield join(above, key), value
 
 
 def costmaps_named(path: Path) -> Tuple[str, ...]:
@@ -229,77 +216,50 @@ def costmaps_named(path: Path) -> Tuple[str, ...]:
     return COSTMAPS if not named and "common" in stem else named
 
 
-def _namespaces(document: _Document) -> Tuple[str, ...]:
-    if set(COSTMAPS).intersection(document.keys):
+def _namespaces(path: Path, content: ParameterTree) -> Tuple[str, ...]:
+    if set(COSTMAPS).intersection(content):
         return ("",)
-    return costmaps_named(document.path) or ("",)
+    return costmaps_named(path) or ("",)
 
 
-class _Document:
-    """Contents of a file: values, the line of each path, and keys that are set twice."""
+def parsed(text: str, path: Path) -> ParameterTree:
+    """Parse YAML; ``path`` is the file that has it, for messages.
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.values: List[Tuple[Tuple[str, ...], Any]] = []  # leaves, in order
-        self.lines: Dict[Tuple[str, ...], int] = {}
-        self.duplicates: List[Tuple[int, str]] = []
-
-    @property
-    def keys(self) -> List[str]:
-        """The names at the top level."""
-        return list(dict.fromkeys(path[0] for path, _ in self.values))
-
-    def enter(self, node: str) -> None:
-        """Keep the namespace of a node, as in a dump of a parameter server."""
-        self.values = [
-            (path[1:], value) for path, value in self.values if path[0] == node and len(path) > 1
-        ]
-        self.lines = {
-            path[1:]: line for path, line in self.lines.items() if path[0] == node and len(path) > 1
-        }
-
-
-def _read(path: Path, arguments: Mapping[str, str]) -> _Document:
-    text = _substituted(read_text(path, MAX_BYTES), path, arguments)
-    document = _parsed(text, path)
-    _enter_node(document, f"move_base{arguments.get('i', '')}")
-    return document
-
-
-def _parsed(text: str, path: Path) -> _Document:
-    document = _Document(path)
+    Raises:
+        InputError: The text is not YAML.
+    """
+    tree = ParameterTree()
     try:
         loader = PlainLoader(text)
     except yaml.YAMLError as error:  # characters that YAML does not allow
         raise InputError([_syntax_error(error, path)]) from error
     try:
         node = loader.get_single_node()
-        if node is None:
-            return document
-        if not isinstance(node, yaml.MappingNode):
+        if isinstance(node, yaml.MappingNode):
+            _collect(node, (), tree, loader, path)
+        elif node is not None:
             raise InputError([f"{path}:1: not a mapping; expected names of parameters with values"])
-        _collect(node, (), document, loader)
     except yaml.YAMLError as error:
         raise InputError([_syntax_error(error, path)]) from error
     finally:
         loader.dispose()
-    return document
+    return tree
 
 
-def _enter_node(document: _Document, own: str) -> None:
-    """Enter the namespace of a move_base node, which may be in that of a robot.
+def _tree_of_node(tree: ParameterTree, own: str) -> ParameterTree:
+    """Return the namespace of a move_base node, which may be in that of a robot.
 
     Args:
-        document: A file, or a dump of a parameter server.
+        tree: A file, or a dump of a parameter server.
         own: Name of the node, if there are several.
     """
-    for depth in (1, 2):
-        paths = {path[:depth] for path, _ in document.values if len(path) > depth}
-        nodes = {path[-1]: path for path in sorted(paths) if _NODE.fullmatch(path[-1])}
+    inner = [join(above, name) for above in tree for name in below(tree, above)]
+    for paths in (sorted(tree), sorted(inner)):
+        found = {path.split("/")[-1]: path for path in paths if below(tree, path)}
+        nodes = {name: path for name, path in found.items() if _NODE.fullmatch(name)}
         if nodes:
-            for name in nodes.get(own, next(iter(nodes.values()))):
-                document.enter(name)
-            return
+            return tree.at(nodes.get(own, next(iter(nodes.values()))))
+    return tree
 
 
 def _substituted(text: str, path: Path, arguments: Mapping[str, str]) -> str:
@@ -324,56 +284,49 @@ def _substituted(text: str, path: Path, arguments: Mapping[str, str]) -> str:
 
 
 def _collect(
-    node: yaml.MappingNode, above: Tuple[str, ...], document: _Document, loader: PlainLoader
+    node: yaml.MappingNode,
+    above: Tuple[str, ...],
+    tree: ParameterTree,
+    loader: PlainLoader,
+    file: Path,
 ) -> None:
-    """Collect values with their lines, and duplicate keys, from the nodes of a mapping."""
+    """Collect values with their lines from the nodes of a mapping; remark on duplicate keys."""
     seen = set()
     for key_node, _ in node.value:
         if not isinstance(key_node, yaml.ScalarNode):
             continue
         if key_node.value in seen:
-            document.duplicates.append(
-                (key_node.start_mark.line + 1, "/".join((*above, key_node.value)))
-            )
+            place = "/".join((*above, key_node.value))
+            origin = f"{file}:{key_node.start_mark.line + 1}"
+            text = "set twice; YAML uses the last value"
+            tree.remarks.append(Remark(place, CAUTION, text, origin))
         seen.add(key_node.value)
     loader.flatten_mapping(node)  # merge keys, "<<": their values are not duplicates
     for key_node, value_node in node.value:
         key = str(loader.construct_object(key_node, deep=True))
-        line = key_node.start_mark.line + 1
+        origin = f"{file}:{key_node.start_mark.line + 1}"
         path = above + tuple(filter(None, key.split("/")))
         # Each value's path is kept: a long name above many values takes all memory.
         if not above < path or len(path) > MAX_LEVELS or sum(map(len, path)) > MAX_TEXT_LENGTH:
             raise InputError(
                 [
-                    f"{document.path}:{line}: {key[:40]!r} is not the name of a parameter; "
+                    f"{origin}: {key[:40]!r} is not the name of a parameter; "
                     f"expected 1 to {MAX_LEVELS} names with / between them, of at most "
                     f"{MAX_TEXT_LENGTH} characters"
                 ]
             )
-        document.lines[path] = line
+        tree.origins["/".join(path)] = origin
         if isinstance(value_node, yaml.MappingNode):
-            document.values.append((path, {}))
-            _collect(value_node, path, document, loader)
+            _namespace(tree, path)
+            _collect(value_node, path, tree, loader, file)
         else:
-            document.values.append((path, loader.construct_object(value_node, deep=True)))
-
-
-def _merge(tree: ParameterTree, document: _Document, prefix: str) -> None:
-    """Merge a file into the tree key by key."""
-    above = tuple(filter(None, prefix.split("/")))
-    for below, value in document.values:
-        path = above + below
-        namespace = _namespace(tree, path[:-1])
-        if value == {} and isinstance(value, dict):
-            if not isinstance(namespace.get(path[-1]), dict):
-                namespace[path[-1]] = {}
-        else:
-            namespace[path[-1]] = value
-        tree.origins["/".join(path)] = f"{document.path}:{document.lines[below]}"
+            value = loader.construct_object(value_node, deep=True)
+            _namespace(tree, path[:-1])[path[-1]] = value
 
 
 def _namespace(tree: Dict[str, Any], path: Iterable[str]) -> Dict[str, Any]:
-    for name in path:
+    """Return the namespace at a path; make it if it is missing, or is a value."""
+    for name in filter(None, path):
         if not isinstance(tree.get(name), dict):
             tree[name] = {}
         tree = tree[name]

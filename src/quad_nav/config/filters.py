@@ -14,9 +14,9 @@ from quad_nav.config.plugins import (
     COMMAND_FILTER,
     SCAN_FILTER,
     Interface,
-    Parameters,
     Plugin,
     load_class,
+    plugin_of,
 )
 from quad_nav.config.reader import Namespace, check_class, named_types, subtree
 from quad_nav.errors import InputError
@@ -71,9 +71,7 @@ def filters_of(tree: Mapping[str, Any], key: str) -> Tuple[Tuple[str, FilterType
         if kind == own:
             found.append((name, kind))
             continue
-        loaded = load_class(class_name(kind), interface)
-        parameters = Parameters(tree.get(name, {}), name)
-        found.append((name, Plugin(loaded, parameters, interface.methods_of)))
+        found.append((name, plugin_of(class_name(kind), interface, tree.get(name, {}), name)))
     return tuple(found)
 
 

@@ -13,7 +13,7 @@ from typing import Any, Dict, List, Mapping, Sequence, Tuple
 
 import yaml
 
-from quad_nav.config.files import ParameterTree, merge_text, set_value
+from quad_nav.config.files import ParameterTree, merge_tree, parsed, set_value
 from quad_nav.config.notes import CAUTION, Remark
 from quad_nav.config.substitution import Shared, Substitution, TooLarge, Unresolved, is_package
 from quad_nav.errors import InputError, excerpt
@@ -24,6 +24,7 @@ from quad_nav.files.xml_tree import MAX_DEPTH, Element
 
 _TRUE, _FALSE = ("true", "1"), ("false", "0")
 _TYPES = ("move_base", "fleet")
+_TAGS = ("arg", "include", "group", "param", "rosparam", "node")
 
 
 def is_launch_file(path: Path) -> bool:
@@ -104,29 +105,10 @@ class _Reader:
             raise InputError(
                 [f"{path}: nodes of type move_base: {found}; expected {expected}", *unread]
             )
-        tree = ParameterTree()
-        values: Any = self._server
-        for name in own[0].split("/"):
-            values = values.get(name) if isinstance(values, dict) else None
-        tree.update(values if isinstance(values, dict) else {})
-        prefix = f"{own[0]}/"
-        tree.origins = {
-            place[len(prefix) :]: origin
-            for place, origin in self._server.origins.items()
-            if place.startswith(prefix)
-        }
-        tree.remarks += self._server.remarks
-        return tree
+        return self._server.at(own[0])
 
     def _children(self, parent: Element, scope: _Scope) -> None:
-        readers = {
-            "arg": self._arg,
-            "include": self._include,
-            "group": self._group,
-            "param": self._param,
-            "rosparam": self._rosparam,
-            "node": self._node,
-        }
+        readers = {tag: getattr(self, f"_{tag}") for tag in _TAGS}
         self._depth += 1
         if self._depth > MAX_DEPTH:
             raise self._shared.too_large(f"{MAX_DEPTH} elements inside each other")
@@ -231,7 +213,7 @@ class _Reader:
         if attributes.get("subst_value", "").lower() in _TRUE:
             text = scope.words.text(text)
         try:
-            merge_text(self._server, text, path, place)
+            merge_tree(self._server, parsed(text, path), place)
         except InputError:
             if self._is_of_navigation(f"{place}/"):
                 raise

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, List, Mapping, Optional, Tuple, Type
+from typing import Any, Dict, List, Mapping, Optional, Tuple, cast
 
 from quad_nav.config.notes import CAUTION, Notes, join
-from quad_nav.config.plugins import LAYER, Parameters, PluginLayerParams, is_dotted, load_class
+from quad_nav.config.plugins import LAYER, PluginLayerParams, is_dotted, plugin_of
 from quad_nav.config.reader import (
     Namespace,
     Table,
     check_class,
-    inherited,
     made,
     normalise,
     subtree,
@@ -68,18 +67,14 @@ def normalise_layer(
 ) -> None:
     """Normalise one layer's namespace as move_base does.
 
-    Args:
-        costmap: The costmap's namespace.
-        costmap_path: Path of the costmap.
-        name: The layer's name.
-        layer_type: The layer's type, or the dotted name of a plugin.
-        chain: The enclosing (path, namespace), the innermost first, for inherited parameters.
-        notes: Receives faults and remarks.
+    ``chain`` has the enclosing (path, namespace), the innermost first, for inherited parameters.
     """
     path = join(costmap_path, name)
     layer = subtree(costmap, name, costmap_path, notes)
     if layer_type not in LAYERS:
-        _normalise_plugin(layer, path, costmap_path, name, layer_type, notes)
+        # A plugin checks its other parameters itself.
+        normalise(layer, path, Table((LayerParams,)), notes, also_known=layer)
+        check_class(layer_type, LAYER, join(costmap_path, "plugins", name), notes)
         return
     table = LAYERS[layer_type]
     if not issubclass(table.owners[0], ObstacleLayerParams):
@@ -88,11 +83,8 @@ def normalise_layer(
     sources = source_names(layer)
     described = {key for key, value in layer.items() if isinstance(value, dict)}
     for source in sorted(described.difference(sources)):
-        notes.remark(
-            join(path, source),
-            CAUTION,
-            "looks like a source, but observation_sources does not list it; not read",
-        )
+        text = "looks like a source, but observation_sources does not list it; not read"
+        notes.remark(join(path, source), CAUTION, text)
     for source in sources:
         _normalise_source(layer, path, source, notes)
     _inherit_ranges(layer, path, chain, notes)
@@ -103,24 +95,18 @@ def layer_params(
     costmap: Mapping[str, Any], costmap_path: str, name: str, layer_type: str
 ) -> Optional[LayerParams]:
     """Make a layer's dataclass from a normalised costmap; None if its type is not supported."""
-    if layer_type in LAYERS:
-        return _layer_params(LAYERS[layer_type].owners[0], costmap[name])
-    if not is_dotted(layer_type):
-        return None
-    written = Parameters(costmap.get(name, {}), join(costmap_path, name))
-    return PluginLayerParams(
-        enabled=written.get("enabled", True),
-        parameters=written,
-        plugin_class=load_class(layer_type, LAYER),
-    )
-
-
-def _normalise_plugin(
-    layer: Namespace, path: str, costmap_path: str, name: str, layer_type: str, notes: Notes
-) -> None:
-    """Check a plugin's class and ``enabled``; it checks its other parameters itself."""
-    normalise(layer, path, Table((LayerParams,)), notes, also_known=layer)
-    check_class(layer_type, LAYER, join(costmap_path, "plugins", name), notes)
+    layer = costmap.get(name, {})
+    if layer_type not in LAYERS:
+        if not is_dotted(layer_type):
+            return None
+        plugin = plugin_of(layer_type, LAYER, layer, join(costmap_path, name))
+        enabled = layer.get("enabled", True)
+        return PluginLayerParams(enabled, plugin.plugin_class, plugin.parameters)
+    owner = LAYERS[layer_type].owners[0]
+    if not issubclass(owner, ObstacleLayerParams):
+        return cast(LayerParams, made(owner, layer))
+    sources = [_source_params(layer.get(one, {}), one) for one in source_names(layer)]
+    return made(owner, layer, sources=tuple(sources))
 
 
 def source_names(layer: Mapping[str, Any]) -> List[str]:
@@ -137,34 +123,22 @@ def _normalise_source(layer: Namespace, path: str, name: str, notes: Notes) -> N
     if data_type is None:
         notes.remark(place, CAUTION, "no data_type: move_base subscribes to a PointCloud")
     elif isinstance(data_type, str) and data_type not in _DATA_TYPES:
-        notes.problem(
-            join(place, "data_type"),
-            f"{data_type!r} is not a type of sensor; expected {SOURCE_TABLE['data_type'].expected}",
-        )
+        expected = SOURCE_TABLE["data_type"].expected
+        text = f"{data_type!r} is not a type of sensor; expected {expected}"
+        notes.problem(join(place, "data_type"), text)
     period = source.get("expected_update_rate")
     if isinstance(period, float) and period > _LONG_PERIOD_S:
-        notes.remark(
-            join(place, "expected_update_rate"),
-            CAUTION,
-            f"{period} is a period in seconds, not a rate: the sensor times out after that long",
-        )
+        text = f"{period} is a period in seconds, not a rate: the sensor times out after that long"
+        notes.remark(join(place, "expected_update_rate"), CAUTION, text)
 
 
 def _inherit_ranges(layer: Namespace, path: str, chain: Chain, notes: Notes) -> None:
-    """Inherit the sources' ranges from the costmap or the node's level."""
+    """Look the sources' ranges up in enclosing namespaces, as ROS's ``searchParam`` does."""
     for key in _RANGES:
-        written_at, value = inherited(key, chain)
-        if key not in layer and written_at:
-            layer[key] = value
-            notes.moved(join(path, key), written_at)
-
-
-def _layer_params(owner: Type[LayerParams], layer: Mapping[str, Any]) -> LayerParams:
-    if not issubclass(owner, ObstacleLayerParams):
-        return made(owner, layer)
-    names = source_names(layer)
-    sources = tuple(_source_params(layer.get(source, {}), source) for source in names)
-    return made(owner, layer, sources=sources)
+        above = next((one for one in chain if key in one[1]), None)
+        if key not in layer and above is not None:
+            layer[key] = above[1][key]
+            notes.moved(join(path, key), join(above[0], key))
 
 
 def _source_params(source: Mapping[str, Any], name: str) -> SourceParams:

@@ -81,11 +81,6 @@ class Notes:
         """Name another place, where the value at ``path`` was written, in messages about it."""
         self._moved[path] = self._moved.get(written_at, written_at)
 
-    @property
-    def problems(self) -> List[str]:
-        """The faults as lines of text."""
-        return list(map(str, self.faults))
-
     def problem(self, path: str, text: str) -> None:
         """Add a fault."""
         fault = self._about(path, ERROR, text)
@@ -123,12 +118,9 @@ def join(*parts: str) -> str:
 
 
 def without_effect(remarks: Iterable[Remark], paths: Sequence[str], where: str) -> List[str]:
-    """Return a line for each of some parameters that does not do what it says.
+    """Return a line for each parameter at ``paths`` that does not do what it says.
 
-    Args:
-        remarks: Remarks on the whole configuration.
-        paths: Paths of the parameters.
-        where: Name of the configuration that they are set on top of.
+    ``where`` is the name of the configuration that they are set on top of.
     """
     own = [f"/{path.strip('/')}/" for path in paths]
     return [

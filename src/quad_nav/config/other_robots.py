@@ -44,14 +44,26 @@ _PLANNERS = {
 _LOWEST_M, _HIGHEST_M = 0.3, 2.0
 _SMALLEST_BODY_M = 0.05
 _VOXELS = 10
+# (kind of change, place, kind of remark, text with the changes) in the order of the remarks.
+_REMARKS = (
+    (
+        "slashes",
+        "frames",
+        CAUTION,
+        "{}: tf2 refuses the leading slash, move_base in C++ does not run with it",
+    ),
+    ("frames", "frames", MAPPED, "{}"),
+    ("topics", "topics", MAPPED, "{}"),
+    ("layers", "layers", MAPPED, "{}"),
+    ("stand-ins", "sensors", MAPPED, "the LIDAR stands in for {}"),
+    ("sensors", "sensors", LEFT_OUT, "{}: left out, a quadcopter has none"),
+    ("lasers", "sensors", LEFT_OUT, "{}: left out, the one LIDAR sees all around"),
+    ("heights", "heights", MAPPED, "{}: raised to the LIDAR of a flying robot"),
+)
 
 
 def adapted(tree: ParameterTree, number: int) -> ParameterTree:
     """Adapt the parameters of another robot to quadcopter ``number``.
-
-    Args:
-        tree: The parameters as the files have them; unchanged.
-        number: Number of the quadcopter.
 
     Returns:
         A copy with the changes, and a remark for each kind of change.
@@ -75,10 +87,8 @@ def input_faults(costmaps: Mapping[str, CostmapParams], number: int) -> Iterator
                 yield key, f"{getattr(costmap, key)}; expected {' or '.join(names)}"
         for layer, source in _sources(costmap):
             if source.sensor_frame.lstrip("/") not in ("", lidar):
-                yield (
-                    f"{layer}/{source.name}",
-                    f"sensor_frame {source.sensor_frame}; expected {lidar} or none",
-                )
+                problem = f"sensor_frame {source.sensor_frame}; expected {lidar} or none"
+                yield f"{layer}/{source.name}", problem
 
 
 def sensor_faults(costmaps: Mapping[str, CostmapParams]) -> Iterator[Tuple[str, str]]:
@@ -86,11 +96,8 @@ def sensor_faults(costmaps: Mapping[str, CostmapParams]) -> Iterator[Tuple[str, 
     for costmap in costmaps.values():
         for layer, source in _sources(costmap):
             if source.data_type != "LaserScan":
-                yield (
-                    f"{layer}/{source.name}",
-                    f"data_type {source.data_type}; expected LaserScan, the only sensor of the "
-                    "simulated robots",
-                )
+                expected = "expected LaserScan, the only sensor of the simulated robots"
+                yield f"{layer}/{source.name}", f"data_type {source.data_type}; {expected}"
 
 
 def _sources(costmap: CostmapParams) -> Iterator[Tuple[str, SourceParams]]:
@@ -106,15 +113,11 @@ class _Fit:
     def __init__(self, tree: ParameterTree, number: int) -> None:
         self.tree = tree
         self._number = number
-        self._frames: Dict[str, str] = {}
-        self._slashes: Dict[str, None] = {}
-        self._topics: Dict[str, None] = {}
-        self._maps: Dict[str, None] = {}
-        self._sensors: Dict[str, None] = {}
-        self._standing_in: Dict[str, None] = {}
-        self._lasers: Dict[str, None] = {}
-        self._layers: Dict[str, str] = {}
-        self._heights: Dict[str, None] = {}
+        # Kind of change -> what was changed, each once in the order of the files.
+        self._found: Dict[str, Dict[str, None]] = {}
+
+    def _note(self, kind: str, change: str) -> None:
+        self._found.setdefault(kind, {})[change] = None
 
     def run(self) -> None:
         """Change the tree and add the remarks."""
@@ -160,10 +163,8 @@ class _Fit:
     def _map_frames(self, costmap: Dict[str, Any]) -> None:
         frame = costmap.get("global_frame", CostmapParams.global_frame)
         if isinstance(frame, str):
-            is_odometry = "odom" in frame.rpartition("/")[2]
-            costmap["global_frame"] = self._frame(
-                frame, f"odom{self._number}" if is_odometry else "map"
-            )
+            own = f"odom{self._number}" if "odom" in frame.rpartition("/")[2] else "map"
+            costmap["global_frame"] = self._frame(frame, own)
         frame = costmap.get("robot_base_frame", CostmapParams.robot_base_frame)
         if isinstance(frame, str):
             costmap["robot_base_frame"] = self._frame(frame, f"base_link{self._number}")
@@ -171,17 +172,17 @@ class _Fit:
     def _frame(self, given: str, own: str) -> str:
         """Return the quadcopter's frame, or the given one if it is of another quadcopter."""
         if given.startswith("/"):
-            self._slashes[given] = None
+            self._note("slashes", given)
         if _OWN_NAME.fullmatch(given):
             return given
         if given.lstrip("/") != own:
-            self._frames[given] = own.replace(str(self._number), "{i}")
+            self._note("frames", f"{given} is {own.replace(str(self._number), '{i}')}")
         return own
 
     def _map_map_topic(self, namespace: Dict[str, Any]) -> None:
         topic = namespace.get("map_topic")
         if isinstance(topic, str) and topic.lstrip("/") != "map":
-            self._maps[topic] = None
+            self._note("maps", f"{topic} is /map")
             namespace["map_topic"] = "/map"
 
     def _replace_layers(self, costmap: Dict[str, Any]) -> None:
@@ -200,7 +201,8 @@ class _Fit:
             if not own and isinstance(below, dict) and "observation_sources" in below:
                 own = "costmap_2d::ObstacleLayer"
             if own:
-                entry["type"] = self._layers[kind] = own
+                entry["type"] = own
+                self._note("layers", f"{kind} is {own}")
 
     def _map_sources(self, costmap: Dict[str, Any], name: str) -> None:
         """Map the lasers of all layers; a costmap without one gets the LIDAR for another sensor."""
@@ -221,17 +223,13 @@ class _Fit:
             namespace, stand_in = clouds.pop(0)
             namespace["observation_sources"] = stand_in
             source = namespace.setdefault(stand_in, {}) or {}
-            namespace[stand_in] = {
-                **source,
-                "data_type": "LaserScan",
-                "marking": True,
-                "clearing": True,
-            }
-            self._standing_in[stand_in] = None
+            seeing = {"data_type": "LaserScan", "marking": True, "clearing": True}
+            namespace[stand_in] = {**source, **seeing}
+            self._note("stand-ins", stand_in)
             self._map_source(namespace[stand_in], stand_in)
         for namespace, left in clouds:
             data_type = _source(namespace, left).get("data_type", "PointCloud")
-            self._sensors[f"{left} ({data_type})"] = None
+            self._note("sensors", f"{left} ({data_type})")
             namespace.pop(left, None)
 
     def _kept(self, namespace: Dict[str, Any], names: List[str]) -> List[str]:
@@ -247,7 +245,7 @@ class _Fit:
             source = _source(namespace, name)
             purposes = {key for key in ("marking", "clearing") if source.get(key, key == "marking")}
             if kept and purposes <= done:
-                self._lasers[name] = None
+                self._note("lasers", name)
                 namespace.pop(name, None)
                 continue
             done |= purposes
@@ -259,7 +257,7 @@ class _Fit:
         topic = source.get("topic", name)
         own = f"scan{self._number}"
         if isinstance(topic, str) and topic not in (*_OWN_TOPICS, own, f"/{own}"):
-            self._topics[topic] = None
+            self._note("topics", f"{topic} is /scan{{i}}")
             source["topic"] = f"/{own}"
         frame = source.get("sensor_frame", "")
         if isinstance(frame, str) and frame:
@@ -270,7 +268,7 @@ class _Fit:
 
     def _set_height(self, namespace: Dict[str, Any], key: str, value: float) -> None:
         if key in namespace and namespace[key] != value:
-            self._heights[key] = None
+            self._note("heights", key)
         namespace[key] = value
 
     def _raise_heights(self, namespace: Dict[str, Any]) -> None:
@@ -284,9 +282,8 @@ class _Fit:
             if bottom > _LOWEST_M:
                 self._set_height(namespace, "origin_z", 0.0)
             if bottom + voxels * size < _HIGHEST_M - 1e-6:
-                self._set_height(
-                    namespace, "z_resolution", (_HIGHEST_M - min(bottom, 0.0)) / voxels
-                )
+                size = (_HIGHEST_M - min(bottom, 0.0)) / voxels
+                self._set_height(namespace, "z_resolution", size)
         if namespace.get("mark_threshold", 0) != 0:
             self._set_height(namespace, "mark_threshold", 0)
 
@@ -297,11 +294,8 @@ class _Fit:
             return None
         footprint = costmap.get("footprint", self.tree.get("footprint", []))
         try:
-            polygon = (
-                polygon_from_text(footprint)
-                if isinstance(footprint, str)
-                else polygon_from_list(footprint)
-            )
+            convert = polygon_from_text if isinstance(footprint, str) else polygon_from_list
+            polygon = convert(footprint)
         except ValueError:  # a fault that ``load`` reports
             return None
         default_m = CostmapParams.robot_radius_m
@@ -315,36 +309,17 @@ class _Fit:
         return body_m
 
     def _add_remarks(self, body_m: Optional[float]) -> None:
-        add = self.tree.remarks.append
-        if self._slashes:
-            names = ", ".join(self._slashes)
-            text = f"{names}: tf2 refuses the leading slash, move_base in C++ does not run with it"
-            add(Remark("frames", CAUTION, text))
-        pairs = [f"{given} is {own}" for given, own in self._frames.items()]
-        topics = [f"{topic} is /scan{{i}}" for topic in self._topics]
-        topics += [f"{topic} is /map" for topic in self._maps]
-        layers = [f"{kind} is {own}" for kind, own in self._layers.items()]
-        for place, changes in (("frames", pairs), ("topics", topics), ("layers", layers)):
+        self._found["topics"] = {**self._found.get("topics", {}), **self._found.get("maps", {})}
+        for kind, place, remark, text in _REMARKS:
+            changes = ", ".join(self._found.get(kind, ()))
             if changes:
-                add(Remark(place, MAPPED, ", ".join(changes)))
-        if self._standing_in:
-            text = f"the LIDAR stands in for {', '.join(self._standing_in)}"
-            add(Remark("sensors", MAPPED, text))
-        if self._sensors:
-            text = f"{', '.join(self._sensors)}: left out, a quadcopter has none"
-            add(Remark("sensors", LEFT_OUT, text))
-        if self._lasers:
-            text = f"{', '.join(self._lasers)}: left out, the one LIDAR sees all around"
-            add(Remark("sensors", LEFT_OUT, text))
-        if self._heights:
-            text = f"{', '.join(self._heights)}: raised to the LIDAR of a flying robot"
-            add(Remark("heights", MAPPED, text))
+                self.tree.remarks.append(Remark(place, remark, text.format(changes)))
         if body_m is not None:
             text = (
                 f"the simulated body is a disc of {body_m:g} m radius, which fits into the "
                 "robot's footprint; set body_radius for another"
             )
-            add(Remark("body_radius", MAPPED, text))
+            self.tree.remarks.append(Remark("body_radius", MAPPED, text))
 
 
 def _below(costmap: Mapping[str, Any]) -> List[Dict[str, Any]]:

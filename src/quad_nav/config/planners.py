@@ -7,93 +7,126 @@ To add a planner, add a line to ``GLOBAL_PLANNERS`` or ``LOCAL_PLANNERS``, and o
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
+from typing import Any, Dict, List, Mapping, Optional
 
 from quad_nav.config.fixes import with_fixes
-from quad_nav.config.local_planners import (
-    DWA_TABLE,
-    LATCH,
-    TRAJECTORY_PLANNER,
-    TRAJECTORY_PLANNER_TABLE,
-    dwa_params,
-    normalise_dwa,
-    normalise_trajectory_planner,
-    trajectory_planner_params,
-)
-from quad_nav.config.notes import RENAMED, UNSUPPORTED, UNUSED, Notes
+from quad_nav.config.notes import CAUTION, IGNORED, RENAMED, UNSUPPORTED, UNUSED, Notes, join
 from quad_nav.config.plugins import (
     GLOBAL_PLANNER,
     LOCAL_PLANNER,
     Interface,
-    Parameters,
-    Plugin,
     is_dotted,
-    load_class,
     plugin_name,
+    plugin_of,
 )
-from quad_nav.config.reader import Namespace, Table, check_class, made, normalise, subtree
+from quad_nav.config.reader import (
+    Namespace,
+    Table,
+    check_class,
+    made,
+    normalise,
+    normalise_value,
+    subtree,
+)
+from quad_nav.control.dwa_planner_params import DwaParams
+from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.navigator.params import DEFAULT_GLOBAL_PLANNER, DEFAULT_LOCAL_PLANNER
 from quad_nav.plan.carrot import CarrotParams
 from quad_nav.plan.global_planner import SearchPlannerParams
 from quad_nav.plan.navfn import NavfnParams
 from quad_nav.recovery import TurnLimits
 
-_UNUSED = "read and never used"
-NAVFN_TABLE = Table((NavfnParams,))
-GLOBAL_PLANNER_TABLE = Table(
-    (SearchPlannerParams,),
-    ignored={
-        "default_tolerance": _UNUSED,
-        "planner_window_x": _UNUSED,
-        "planner_window_y": _UNUSED,
-        "visualize_potential": "the name is publish_potential",
-    },
-)
-CARROT_TABLE = Table(
-    (CarrotParams,), ignored={"step_size": _UNUSED, "min_dist_from_robot": _UNUSED}
-)
+TRAJECTORY_PLANNER = "TrajectoryPlannerROS"
 SEARCH_PLANNER = "global_planner/GlobalPlanner"
 CARROT = "carrot_planner/CarrotPlanner"
 DWA_PLANNER = "dwa_local_planner/DWAPlannerROS"
+_UNUSED = "read and never used"
+_ONE_MODEL = "the costmap is the only world model"
 
 
-@dataclass(frozen=True)
-class PlannerType:
-    """Planner that can be chosen.
-
-    Attributes:
-        table: Parameters in the planner's namespace.
-        normalise: Normalises that namespace as move_base does.
-        params: Makes the planner's dataclass from a normalised tree.
-        inherited: Parameters that may be at the node's level too.
-    """
-
-    table: Table
-    normalise: Callable[[Namespace, Notes], None]
-    params: Callable[[Mapping[str, Any]], Any]
-    inherited: Tuple[str, ...] = ()
+def _look_at_trajectory_planner(planner: Namespace, path: str, notes: Notes) -> None:
+    if isinstance(planner.get("y_vels"), list):
+        text = "ignored by move_base: it is a list; expected a string, as in '-0.3, 0.3'"
+        notes.remark(join(path, "y_vels"), IGNORED, text)
+        del planner["y_vels"]
+    if planner.get("meter_scoring") is False and planner.get("respect_meter_scoring") is not True:
+        text = "ignored by move_base: distances are always scored in metres"
+        notes.remark(join(path, "meter_scoring"), IGNORED, text)
+    if isinstance(planner.get("escape_vel"), (int, float)) and planner["escape_vel"] > 0:
+        text = "the robot escapes forwards; expected a negative velocity, to back up"
+        notes.remark(join(path, "escape_vel"), CAUTION, text)
 
 
-def _plain(plugin: str, table: Table) -> PlannerType:
-    """Make the type of a planner whose namespace holds the table's parameters only."""
-    name = plugin_name(plugin)
-    return PlannerType(
-        table,
-        normalise=lambda tree, notes: normalise(subtree(tree, name, "", notes), name, table, notes),
-        params=lambda tree: made(table.owners[0], tree.get(name, {})),
-    )
+def _look_at_dwa(planner: Namespace, path: str, notes: Notes) -> None:
+    if planner.get("occdist_scale") == 0:
+        text = "0 disables the scoring of obstacles: the robot may hit them"
+        notes.remark(join(path, "occdist_scale"), CAUTION, text)
 
 
-GLOBAL_PLANNERS: Dict[str, PlannerType] = {
-    DEFAULT_GLOBAL_PLANNER: _plain(DEFAULT_GLOBAL_PLANNER, NAVFN_TABLE),
-    SEARCH_PLANNER: _plain(SEARCH_PLANNER, GLOBAL_PLANNER_TABLE),
-    CARROT: _plain(CARROT, CARROT_TABLE),
-}
-LOCAL_PLANNERS: Dict[str, PlannerType] = {
-    DEFAULT_LOCAL_PLANNER: PlannerType(
-        TRAJECTORY_PLANNER_TABLE, normalise_trajectory_planner, trajectory_planner_params
+GLOBAL_PLANNERS: Dict[str, Table] = {
+    DEFAULT_GLOBAL_PLANNER: Table((NavfnParams,)),
+    SEARCH_PLANNER: Table(
+        (SearchPlannerParams,),
+        ignored={
+            "default_tolerance": _UNUSED,
+            "planner_window_x": _UNUSED,
+            "planner_window_y": _UNUSED,
+            "visualize_potential": "the name is publish_potential",
+        },
     ),
-    DWA_PLANNER: PlannerType(DWA_TABLE, normalise_dwa, dwa_params, inherited=(LATCH.name,)),
+    CARROT: Table((CarrotParams,), ignored={"step_size": _UNUSED, "min_dist_from_robot": _UNUSED}),
+}
+LOCAL_PLANNERS: Dict[str, Table] = {
+    DEFAULT_LOCAL_PLANNER: Table(
+        (TrajectoryPlannerParams,),
+        restores=True,
+        unsupported={"world_model": _ONE_MODEL, "point_grid": _ONE_MODEL},
+        ignored={
+            "stop_time_buffer": _UNUSED,
+            "backup_vel": "escape_vel overrides it",
+            "acc_limit_x": "renamed to acc_lim_x",
+            "acc_limit_y": "renamed to acc_lim_y",
+            "acc_limit_th": "renamed to acc_lim_theta",
+            "acc_lim_th": "renamed to acc_lim_theta",
+        },
+        renamed={
+            "pdist_scale": "path_distance_bias",
+            "gdist_scale": "goal_distance_bias",
+            "min_in_place_rotational_vel": "min_in_place_vel_theta",
+        },
+        look=_look_at_trajectory_planner,
+    ),
+    DWA_PLANNER: Table(
+        (DwaParams,),
+        restores=True,
+        unsupported={
+            "publish_traj_pc": "the sampled trajectories are not published",
+            "odom_topic": "the topic of the odometry is odom; remap it",
+        },
+        # The planner warns about names from before ROS Melodic and does not read them.
+        ignored={
+            "max_trans_vel": "renamed to max_vel_trans",
+            "min_trans_vel": "renamed to min_vel_trans",
+            "max_rot_vel": "renamed to max_vel_theta",
+            "min_rot_vel": "renamed to min_vel_theta",
+            "rot_stopped_vel": "renamed to theta_stopped_vel",
+            "trans_stopped_velocity": "renamed to trans_stopped_vel",
+            "rot_stopped_velocity": "renamed to theta_stopped_vel",
+            "acc_lim_th": "renamed to acc_lim_theta",
+            "acc_limit_x": "renamed to acc_lim_x",
+            "acc_limit_y": "renamed to acc_lim_y",
+            "acc_limit_th": "renamed to acc_lim_theta",
+            "acc_limit_trans": "renamed to acc_lim_trans",
+            "pdist_scale": "renamed to path_distance_bias",
+            "gdist_scale": "renamed to goal_distance_bias",
+            "vtheta_samples": "renamed to vth_samples",
+            "dwa": "renamed to use_dwa",
+            "penalize_negative_x": "upstream has removed this critic",
+        },
+        # Read from the planner's namespace or from the node's level, as upstream does.
+        inherited=("latch_xy_goal_tolerance",),
+        look=_look_at_dwa,
+    ),
 }
 
 
@@ -101,7 +134,7 @@ LOCAL_PLANNERS: Dict[str, PlannerType] = {
 class Slot:
     """Parameter that names a planner: the supported types, and the interface of plugins."""
 
-    types: Mapping[str, PlannerType]
+    types: Mapping[str, Table]
     interface: Interface
 
 
@@ -159,42 +192,41 @@ def normalise_planners(tree: Namespace, notes: Notes) -> None:
     """Normalise the namespaces of the chosen planners as move_base does."""
     chosen = {plugin_name(tree[key]): key for key in SLOTS if isinstance(tree[key], str)}
     for name, key in chosen.items():
-        own = planner_type(tree, key)
-        if own is not None:
-            own.normalise(tree, notes)
-        else:  # plugins check their parameters themselves
-            subtree(tree, name, "", notes)
-    flyable = {plugin_name(name): key for key, slot in SLOTS.items() for name in slot.types}
+        namespace = subtree(tree, name, "", notes)
+        table = planner_table(tree, key)
+        if table is not None:  # plugins check their parameters themselves
+            normalise(namespace, name, table, notes)
+            for inherited in table.inherited:
+                normalise_value(tree, "", table[inherited], notes)
+    flyable = {plugin_name(name): (key, name) for key, slot in SLOTS.items() for name in slot.types}
     for name in [name for name in tree if name not in chosen]:
         if name in flyable:
-            key = flyable[name]
-            planner = next(one for one in SLOTS[key].types if plugin_name(one) == name)
+            key, planner = flyable[name]
             reason = f"unused: {key} is {tree[key]}; expected {key}={planner} to fly with it"
             _normalise_unused(tree, name, reason, notes)
         elif name in _OTHER_PLANNERS:
             notes.remark(name, UNSUPPORTED, "planner not supported; its parameters are not read")
 
 
-def planner_type(tree: Mapping[str, Any], key: str) -> Optional[PlannerType]:
-    """Return the type of the planner that a normalised tree names, None for a plugin."""
+def planner_table(tree: Mapping[str, Any], key: str) -> Optional[Table]:
+    """Return the parameters of the planner that a normalised tree names, None for a plugin."""
     return SLOTS[key].types.get(tree[key])
 
 
 def planner_params(tree: Mapping[str, Any], key: str) -> Any:
     """Make the dataclass of the planner that a normalised tree names, or a ``Plugin``."""
-    own = planner_type(tree, key)
-    if own is not None:
-        return with_fixes(own.params(tree), tree)
-    name = plugin_name(tree[key])
-    interface = SLOTS[key].interface
-    parameters = Parameters(tree.get(name, {}), name)
-    return Plugin(load_class(tree[key], interface), parameters, interface.methods_of)
+    name, table = plugin_name(tree[key]), planner_table(tree, key)
+    namespace = tree.get(name, {})
+    if table is None:
+        return plugin_of(tree[key], SLOTS[key].interface, namespace, name)
+    inherited = {one: tree[one] for one in table.inherited if one in tree}
+    return with_fixes(made(table.owners[0], {**inherited, **namespace}), tree)
 
 
 def local_planner_frequency(tree: Mapping[str, Any]) -> Any:
     """Return the local planner's own ``controller_frequency``, None if it has none."""
     key = "base_local_planner"
-    if planner_type(tree, key) is None:
+    if planner_table(tree, key) is None:
         return None
     return tree[plugin_name(tree[key])].get("controller_frequency")
 

@@ -138,6 +138,14 @@ def _wrong_step(value: Any) -> str:
     return "" if value.command is None else _wrong_twist(value.command)
 
 
+def _wrong_filtered(value: Any) -> str:
+    if isinstance(value, Command):
+        return _wrong_twist(value.velocity)
+    if isinstance(value, FilteredScan):
+        return ""
+    return f"{_described(value)}; expected the Command or the FilteredScan, changed or not"
+
+
 def _wrong_kind(*kinds: type) -> Callable[[Any], str]:
     name = kinds[0].__name__
     return lambda value: "" if isinstance(value, kinds) else f"{_described(value)}; expected {name}"
@@ -145,14 +153,6 @@ def _wrong_kind(*kinds: type) -> Callable[[Any], str]:
 
 def _described(value: Any) -> str:
     return "None" if value is None else f"{type(value).__name__} {str(value)[:60]}"
-
-
-def _wrong_filtered(value: Any) -> str:
-    if isinstance(value, Command):
-        return _wrong_twist(value.velocity)
-    if isinstance(value, FilteredScan):
-        return ""
-    return f"{_described(value)}; expected the Command or the FilteredScan, changed or not"
 
 
 _WRONG: Dict[str, Callable[[Any], str]] = {

@@ -97,8 +97,13 @@ class Plugin:
             InputError: The class refuses its parameters.
             PluginError: The constructor fails otherwise. All methods raise it, too.
         """
-        arguments = (self.parameters, *arguments)
-        return call_constructor(self.plugin_class, self.methods_of, *arguments)
+        return call_constructor(self.plugin_class, self.methods_of, self.parameters, *arguments)
+
+
+def plugin_of(kind: str, interface: Interface, namespace: Mapping[str, Any], place: str) -> Plugin:
+    """Return the plugin of a dotted name, with the parameters of its namespace."""
+    parameters = Parameters(namespace, place)
+    return Plugin(load_class(kind, interface), parameters, interface.methods_of)
 
 
 @dataclass(frozen=True)
@@ -109,12 +114,7 @@ class PluginLayerParams(LayerParams):
     parameters: Parameters = field(default_factory=lambda: Parameters({}, ""))
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> Layer:
-        """Make the layer.
-
-        Raises:
-            InputError: The class refuses its parameters.
-            PluginError: The constructor fails otherwise. All methods raise it, too.
-        """
+        """Make the layer; raises as ``Plugin.make``."""
         arguments = (self, spec, rolling_window, default_cost)
         layer: Layer = call_constructor(self.plugin_class, Layer, *arguments)
         return layer
@@ -170,29 +170,20 @@ def load_class(name: str, interface: Interface) -> Any:
 def _imported(module_name: str) -> Any:
     try:
         return importlib.import_module(module_name)
-    except ModuleNotFoundError as error:
-        missing = error.name or module_name
-        if module_name == missing or module_name.startswith(missing + "."):
-            raise InputError(
-                [
-                    f"no module {missing}; expected package.module.Class with the package's"
-                    " folder in PYTHONPATH"
-                ]
-            ) from error
-        raise InputError([_failure(module_name, error)]) from error
     except Exception as error:  # an import runs arbitrary code
-        raise InputError([_failure(module_name, error)]) from error
-
-
-def _failure(module_name: str, error: Exception) -> str:
-    last = traceback.extract_tb(error.__traceback__)[-1]
-    file, line, text = last.filename, last.lineno, str(error)
-    if isinstance(error, SyntaxError) and error.filename:
-        file, line, text = error.filename, error.lineno, error.msg
-    return (
-        f"cannot import {module_name}: {type(error).__name__}: {text}"
-        f" ({file}:{line}); expected a module that imports without errors"
-    )
+        missing = getattr(error, "name", None) if isinstance(error, ModuleNotFoundError) else None
+        if missing and f"{module_name}.".startswith(f"{missing}."):
+            expected = "expected package.module.Class with the package's folder in PYTHONPATH"
+            raise InputError([f"no module {missing}; {expected}"]) from error
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        file, line, text = last.filename, last.lineno, str(error)
+        if isinstance(error, SyntaxError) and error.filename:
+            file, line, text = error.filename, error.lineno, error.msg
+        problem = (
+            f"cannot import {module_name}: {type(error).__name__}: {text}"
+            f" ({file}:{line}); expected a module that imports without errors"
+        )
+        raise InputError([problem]) from error
 
 
 def _misfits(plugin_class: Any, interface: Interface) -> Iterator[str]:
@@ -216,7 +207,10 @@ def _misfits(plugin_class: Any, interface: Interface) -> Iterator[str]:
         own = getattr(plugin_class, name, None)
         if own is None or (own is function and not interface.derived):
             yield f"it has no method {name}; expected {_call(name, arguments)}"
-        elif not _takes(own, arguments if _is_bound(plugin_class, name) else ("self", *arguments)):
+            continue
+        written = inspect.getattr_static(plugin_class, name)
+        is_bound = isinstance(written, (staticmethod, classmethod))
+        if not _takes(own, arguments if is_bound else ("self", *arguments)):
             yield _expectation(name, own, arguments)
 
 
@@ -230,18 +224,10 @@ def _takes(function: Any, arguments: Tuple[str, ...]) -> bool:
     return True
 
 
-def _is_bound(plugin_class: Any, name: str) -> bool:
-    return isinstance(inspect.getattr_static(plugin_class, name), (staticmethod, classmethod))
-
-
 def _expectation(name: str, own: Any, arguments: Tuple[str, ...]) -> str:
-    return f"{name}{_signature(own)} cannot take its arguments; expected {_call(name, arguments)}"
-
-
-def _signature(function: Any) -> str:
-    """Format the parameters of a function as they are written."""
-    parameters = inspect.signature(function).parameters.values()
-    return f"({', '.join(str(parameter).split(':')[0] for parameter in parameters)})"
+    written = inspect.signature(own).parameters.values()
+    names = ", ".join(str(parameter).split(":")[0] for parameter in written)
+    return f"{name}({names}) cannot take its arguments; expected {_call(name, arguments)}"
 
 
 def _call(name: str, arguments: Tuple[str, ...]) -> str:

@@ -8,14 +8,15 @@ made from normalised namespaces, which hold no faults.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Dict, Iterable, Mapping, Tuple, Type, TypeVar, cast
+from typing import Any, Callable, Dict, Iterable, Mapping, Optional, Tuple, Type, TypeVar, cast
 
-from quad_nav.config.notes import CLAMPED, IGNORED, UNSUPPORTED, Notes, join
+from quad_nav.config.notes import CLAMPED, IGNORED, RENAMED, UNSUPPORTED, Notes, join
 from quad_nav.config.plugins import Interface, load_class
 from quad_nav.errors import InputError
 from quad_nav.parameter import InvalidValue, Parameter, parameters_of
 
 _Params = TypeVar("_Params")
+Namespace = Dict[str, Any]
 RESTORE_DEFAULTS = Parameter(
     "restore_defaults", "bool", False, "Restore to the original configuration."
 )
@@ -31,6 +32,9 @@ class Table:
         is_own: True if upstream has no such namespace.
         unsupported: Name -> reason of keys that move_base reads and this package does not.
         ignored: Name -> reason of keys that move_base ignores too.
+        renamed: Old name -> name; the old one still works.
+        inherited: Parameters that may be at the node's level too.
+        look: Adds remarks on values as they were written.
     """
 
     owners: Tuple[type, ...]
@@ -38,6 +42,9 @@ class Table:
     is_own: bool = False
     unsupported: Mapping[str, str] = field(default_factory=dict)
     ignored: Mapping[str, str] = field(default_factory=dict)
+    renamed: Mapping[str, str] = field(default_factory=dict)
+    inherited: Tuple[str, ...] = ()
+    look: Optional[Callable[[Namespace, str, Notes], None]] = None
 
     @property
     def reconfigurable(self) -> Tuple[Parameter, ...]:
@@ -69,30 +76,36 @@ class Table:
         return tuple(found.values())
 
 
-Namespace = Dict[str, Any]
-
-
 def normalise(
     namespace: Namespace, path: str, table: Table, notes: Notes, also_known: Iterable[str] = ()
 ) -> None:
-    """Check and complete a namespace in place.
-
-    Args:
-        namespace: The namespace, changed in place.
-        path: The namespace's path, for messages.
-        table: The parameters of the namespace.
-        notes: Receives faults and remarks.
-        also_known: Keys that other tables describe.
-    """
+    """Check and complete a namespace in place; ``also_known`` are keys that others describe."""
+    if table.look is not None:
+        table.look(namespace, path, notes)
+    for old in table.renamed:
+        if old in namespace:
+            _rename(namespace, path, old, table.renamed[old], notes)
     for parameter in table.parameters:
-        if parameter.name in namespace:
-            _normalise_value(namespace, path, parameter, notes)
+        normalise_value(namespace, path, parameter, notes)
     for parameter in table.reconfigurable:
         namespace.setdefault(parameter.name, parameter.default)
     _remark_on_other_keys(namespace, path, table, notes, also_known)
 
 
-def _normalise_value(namespace: Namespace, path: str, parameter: Parameter, notes: Notes) -> None:
+def _rename(namespace: Namespace, path: str, old: str, new: str, notes: Notes) -> None:
+    place = join(path, old)
+    if new in namespace:
+        notes.remark(place, IGNORED, f"ignored by move_base: {new} is set too")
+        return
+    namespace[new] = namespace[old]
+    notes.moved(join(path, new), place)
+    notes.remark(place, RENAMED, f"old name of {new}")
+
+
+def normalise_value(namespace: Namespace, path: str, parameter: Parameter, notes: Notes) -> None:
+    """Check and clamp a value in place, if it is set."""
+    if parameter.name not in namespace:
+        return
     given = namespace[parameter.name]
     place = join(path, parameter.name)
     try:
@@ -103,9 +116,8 @@ def _normalise_value(namespace: Namespace, path: str, parameter: Parameter, note
     value = parameter.clamp(checked)
     if value != checked:
         bound = "largest" if value < checked else "smallest"
-        notes.remark(
-            place, CLAMPED, f"{given} clamped to {value}, the {bound} that move_base allows"
-        )
+        text = f"{given} clamped to {value}, the {bound} that move_base allows"
+        notes.remark(place, CLAMPED, text)
     elif value != given:
         notes.remark(place, CLAMPED, f"{given} rounded to {value}; expected a whole number")
     namespace[parameter.name] = value
@@ -114,7 +126,7 @@ def _normalise_value(namespace: Namespace, path: str, parameter: Parameter, note
 def _remark_on_other_keys(
     namespace: Namespace, path: str, table: Table, notes: Notes, also_known: Iterable[str]
 ) -> None:
-    names = {parameter.name for parameter in table.parameters} | set(also_known)
+    names = {parameter.name for parameter in table.parameters} | {*also_known, *table.renamed}
     for key in namespace:
         if key in names:
             continue
@@ -131,11 +143,11 @@ def _remark_on_other_keys(
 def made(
     owner: Type[_Params], namespace: Mapping[str, Any], given: Iterable[str] = (), **others: Any
 ) -> _Params:
-    """Make a dataclass from a normalised namespace.
+    """Make a dataclass from a normalised namespace; what that lacks has its default.
 
     Args:
         owner: The dataclass, which declares the parameters.
-        namespace: The normalised namespace; what it lacks has its default.
+        namespace: The normalised namespace.
         given: Names that were set. The others have their ``initial`` value, where they have one,
             until the first reconfiguration.
         others: Fields with other values than the namespace's.
@@ -163,11 +175,7 @@ def subtree(tree: Namespace, name: str, path: str, notes: Notes) -> Namespace:
 def named_types(entries: Any, place: str, kind: str, notes: Notes) -> Dict[str, str]:
     """Return name -> type of a list of ``{name: , type: }``; report entries of another form.
 
-    Args:
-        entries: The list, as it was written.
-        place: Path of the list.
-        kind: What an entry names, with its article, for messages.
-        notes: Receives faults.
+    ``kind`` is what an entry names, with its article.
     """
     expected = "expected {name: , type: }"
     if not isinstance(entries, list):
@@ -192,19 +200,3 @@ def check_class(name: str, interface: Interface, place: str, notes: Notes) -> No
     except InputError as error:
         for problem in error.problems:
             notes.problem(place, problem)
-
-
-def inherited(name: str, chain: Iterable[Tuple[str, Mapping[str, Any]]]) -> Tuple[str, Any]:
-    """Look a parameter up in enclosing namespaces, as ROS's ``searchParam`` does.
-
-    Args:
-        name: The parameter.
-        chain: (path, namespace), the innermost first.
-
-    Returns:
-        (path, value) of the first namespace that has the name, or ("", None).
-    """
-    for path, namespace in chain:
-        if name in namespace:
-            return join(path, name), namespace[name]
-    return "", None

@@ -8,13 +8,13 @@ from typing import Any, Dict, List, Mapping, Tuple
 
 from quad_nav.config.configuration import (
     Configuration,
-    below,
     navigator_params,
     own_parts,
     tables_of,
     workload_problems,
 )
 from quad_nav.config.costmaps import costmap_params
+from quad_nav.config.files import below
 from quad_nav.config.notes import join
 from quad_nav.config.planners import SLOTS, planner_params
 from quad_nav.errors import InputError

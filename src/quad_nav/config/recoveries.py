@@ -1,13 +1,18 @@
-"""Recovery behaviours: move_base's default sequence, or a listed one."""
+"""Recovery behaviours: move_base's default sequence, or a listed one.
+
+Upstream's ``move_slow_and_clear/MoveSlowAndClear`` changes two parameters of a planner that the
+configuration names. Here it limits all speeds of the chosen local planner, those of flying
+backwards included.
+"""
 
 from __future__ import annotations
 
 from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 
 from quad_nav.config.fixes import with_fixes
-from quad_nav.config.local_planners import TRAJECTORY_PLANNER
 from quad_nav.config.notes import CAUTION, IGNORED, UNSUPPORTED, Notes, join
-from quad_nav.config.plugins import RECOVERY, Parameters, Plugin, is_dotted, load_class
+from quad_nav.config.planners import LOCAL_PLANNERS, TRAJECTORY_PLANNER
+from quad_nav.config.plugins import RECOVERY, Plugin, is_dotted, plugin_name, plugin_of
 from quad_nav.config.reader import (
     Namespace,
     Table,
@@ -17,8 +22,8 @@ from quad_nav.config.reader import (
     normalise,
     subtree,
 )
-from quad_nav.config.speed_limits import check_slow, slow_params
 from quad_nav.costmap.layered import CostmapParams
+from quad_nav.files.values import nearest
 from quad_nav.recovery import (
     ClearCostmapParams,
     MoveSlowAndClearParams,
@@ -39,6 +44,11 @@ TABLES: Dict[str, Table] = {
 }
 _CONSERVATIVE, _AGGRESSIVE, _ROTATE = "conservative_reset", "aggressive_reset", "rotate_recovery"
 _AFFECTED_MAPS = ("local", "global", "both")
+# Speeds that tell when the robot has stopped, or when its footprint grows: they limit nothing.
+_NO_LIMIT = ("_stopped_", "scaling_speed")
+_SLOWED_UPSTREAM = "DWAPlannerROS"
+# Parameters that name one more speed, and their upstream defaults.
+_SPEED_NAMES = {"max_trans_param_name": "max_trans_vel", "max_rot_param_name": "max_rot_vel"}
 
 
 def normalise_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
@@ -62,7 +72,7 @@ def normalise_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
         if kind == CLEAR:
             _normalise_clearing(namespace, name, notes)
         elif kind == MOVE_SLOW:
-            check_slow(namespace, name, tree["base_local_planner"], notes)
+            _look_at_slow(namespace, name, tree["base_local_planner"], notes)
     return listed
 
 
@@ -96,11 +106,8 @@ def _normalise_default_distances(tree: Namespace, notes: Notes) -> None:
     for name, distance in distances.items():
         namespace = subtree(tree, name, "", notes)
         if namespace.get("reset_distance", distance) != distance:
-            notes.remark(
-                join(name, "reset_distance"),
-                IGNORED,
-                f"ignored by move_base: without recovery_behaviors it is {distance}",
-            )
+            text = f"ignored by move_base: without recovery_behaviors it is {distance}"
+            notes.remark(join(name, "reset_distance"), IGNORED, text)
         namespace["reset_distance"] = distance
 
 
@@ -115,12 +122,11 @@ def _listed(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
         if is_dotted(listed[name]):
             check_class(listed[name], RECOVERY, join("recovery_behaviors", name), notes)
             continue
-        notes.remark(
-            join("recovery_behaviors", name),
-            UNSUPPORTED,
+        text = (
             f"{listed.pop(name)} is not supported, skipping this behaviour; expected one of"
-            f" {', '.join(TABLES)}",
+            f" {', '.join(TABLES)}"
         )
+        notes.remark(join("recovery_behaviors", name), UNSUPPORTED, text)
     return tuple(listed.items())
 
 
@@ -146,16 +152,13 @@ def _normalise_clearing(namespace: Namespace, name: str, notes: Notes) -> None:
     maps = namespace.get("affected_maps", "both")
     if isinstance(maps, str) and maps not in _AFFECTED_MAPS:
         expected = TABLES[CLEAR]["affected_maps"].expected
-        notes.remark(
-            join(name, "affected_maps"), CAUTION, f"{maps!r} clears both; expected {expected}"
-        )
+        text = f"{maps!r} clears both; expected {expected}"
+        notes.remark(join(name, "affected_maps"), CAUTION, text)
         namespace["affected_maps"] = "both"
     layers = namespace.get("layer_names", [])
     if not isinstance(layers, list) or not all(isinstance(layer, str) for layer in layers):
-        notes.problem(
-            join(name, "layer_names"),
-            f"{layers!r} is not a list of names; expected names of layers, as in [obstacle_layer]",
-        )
+        expected = "expected names of layers, as in [obstacle_layer]"
+        notes.problem(join(name, "layer_names"), f"{layers!r} is not a list of names; {expected}")
 
 
 def _params(name: str, kind: str, tree: Mapping[str, Any]) -> RecoveryParams:
@@ -165,8 +168,66 @@ def _params(name: str, kind: str, tree: Mapping[str, Any]) -> RecoveryParams:
         layers = None if names is None else tuple(names)
         return made(ClearCostmapParams, namespace, layer_names=layers)
     if kind == MOVE_SLOW:
-        return slow_params(namespace, tree["base_local_planner"])
+        return _slow_params(namespace, tree["base_local_planner"])
     if kind == ROTATE:
         limits = made(TurnLimits, tree.get(TRAJECTORY_PLANNER, {}))
         return made(RotateParams, namespace, limits=limits)
-    return Plugin(load_class(kind, RECOVERY), Parameters(namespace, name), RECOVERY.methods_of)
+    return plugin_of(kind, RECOVERY, namespace, name)
+
+
+def _look_at_slow(namespace: Mapping[str, Any], name: str, planner: str, notes: Notes) -> None:
+    """Add remarks on names that are not of the chosen local planner."""
+    own, speeds = plugin_name(planner), _speeds(planner)
+    if not speeds:
+        notes.remark(name, CAUTION, f"{own} is not limited: plugins have no reconfigurable speeds")
+        return
+    given = namespace.get("planner_namespace", "")
+    if isinstance(given, str) and given.strip("/") not in ("", own):
+        text = f"{given} is not the local planner; limiting {own} instead"
+        notes.remark(join(name, "planner_namespace"), CAUTION, text)
+        return
+    for key, original in _SPEED_NAMES.items():
+        speed = namespace.get(key, "")
+        if isinstance(speed, str) and speed not in ("", original, *speeds):
+            text = f"{own} has no speed parameter {speed}"
+            notes.remark(join(name, key), CAUTION, text, nearest(speed, speeds))
+
+
+def _speeds(planner: str, *units: str) -> Dict[str, str]:
+    """Return parameter -> field of every speed of a local planner; none of a plugin."""
+    if planner not in LOCAL_PLANNERS:
+        return {}
+    return {
+        parameter.name: parameter.field
+        for parameter in LOCAL_PLANNERS[planner].parameters
+        if parameter.kind == "double" and parameter.unit in (units or ("m/s", "rad/s"))
+    }
+
+
+def _slow_params(namespace: Mapping[str, Any], planner: str) -> MoveSlowAndClearParams:
+    """Make the recovery's dataclass from a normalised namespace."""
+    speeds = _speeds(planner)
+
+    def limited(unit: str, key: str) -> Tuple[str, ...]:
+        limits = [
+            field
+            for name, field in _speeds(planner, unit).items()
+            if not any(word in name for word in _NO_LIMIT)
+        ]
+        extra = [speeds[name] for name in (namespace.get(key, ""),) if name in speeds]
+        return tuple(dict.fromkeys([*limits, *extra]))
+
+    def named(key: str) -> str:
+        given = namespace.get("planner_namespace", "") or _SLOWED_UPSTREAM
+        if not speeds or given.strip("/") != plugin_name(planner):
+            return ""  # upstream calls the dynamic_reconfigure server of another planner
+        return speeds.get(namespace.get(key, "") or _SPEED_NAMES[key], "")
+
+    return made(
+        MoveSlowAndClearParams,
+        namespace,
+        named_translation_field=named("max_trans_param_name"),
+        named_rotation_field=named("max_rot_param_name"),
+        translation_fields=limited("m/s", "max_trans_param_name"),
+        rotation_fields=limited("rad/s", "max_rot_param_name"),
+    )

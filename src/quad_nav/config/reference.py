@@ -5,7 +5,7 @@ python -m quad_nav.config.reference > docs/parameters.md
 
 from __future__ import annotations
 
-from typing import List, Tuple
+from typing import Iterator, List, Tuple
 
 from quad_nav.config.configuration import MOVE_BASE_TABLE
 from quad_nav.config.costmaps import COSTMAP_TABLE
@@ -18,6 +18,7 @@ from quad_nav.config.planners import (
     LOCAL_PLANNERS,
     SEARCH_PLANNER,
 )
+from quad_nav.config.plugins import plugin_name
 from quad_nav.config.reader import Table
 from quad_nav.config.recoveries import CLEAR, MOVE_SLOW, ROTATE, TABLES
 from quad_nav.navigator.params import DEFAULT_GLOBAL_PLANNER, DEFAULT_LOCAL_PLANNER
@@ -76,76 +77,47 @@ warnings without flying.
   `TrajectoryPlannerROS` whatever the local planner.
 """
 
+_LAYERS = ("Obstacle", "Voxel", "Inflation", "Static")
 _BEHAVIOUR = "in the namespace of the behaviour's name."
-# (title, text, table) of each section.
-_SECTIONS: Tuple[Tuple[str, str, Table], ...] = (
-    ("move_base", "At the node's level.", MOVE_BASE_TABLE),
-    (
-        "TrajectoryPlannerROS",
-        f"The local planner `{DEFAULT_LOCAL_PLANNER}`.",
-        LOCAL_PLANNERS[DEFAULT_LOCAL_PLANNER].table,
-    ),
-    (
-        "DWAPlannerROS",
-        "The local planner `dwa_local_planner/DWAPlannerROS`.",
-        LOCAL_PLANNERS[DWA_PLANNER].table,
-    ),
-    (
-        "NavfnROS",
-        f"The global planner `{DEFAULT_GLOBAL_PLANNER}`.",
-        GLOBAL_PLANNERS[DEFAULT_GLOBAL_PLANNER].table,
-    ),
-    (
-        "GlobalPlanner",
-        "The global planner `global_planner/GlobalPlanner`.",
-        GLOBAL_PLANNERS[SEARCH_PLANNER].table,
-    ),
-    (
-        "CarrotPlanner",
-        "The global planner `carrot_planner/CarrotPlanner`: a straight line to the goal.",
-        GLOBAL_PLANNERS[CARROT].table,
-    ),
-    (
-        FIXES,
-        "Our own: `upstream: true` restores [upstream bugs](upstream_bugs.md).",
-        GROUPS[FIXES],
-    ),
-    ("peers", "Our own: see [avoidance between robots](peers.md).", GROUPS["peers"]),
-    ("Costmaps", "In `global_costmap` and `local_costmap`.", COSTMAP_TABLE),
-    ("Obstacle layer", "`costmap_2d::ObstacleLayer`.", LAYERS["costmap_2d::ObstacleLayer"]),
-    ("Voxel layer", "`costmap_2d::VoxelLayer`.", LAYERS["costmap_2d::VoxelLayer"]),
-    (
-        "Sources",
-        "Each name in `observation_sources` is a namespace in the layer's.",
-        SOURCE_TABLE,
-    ),
-    ("Inflation layer", "`costmap_2d::InflationLayer`.", LAYERS["costmap_2d::InflationLayer"]),
-    ("Static layer", "`costmap_2d::StaticLayer`.", LAYERS["costmap_2d::StaticLayer"]),
-    (
-        "ClearCostmapRecovery",
-        f"`clear_costmap_recovery/ClearCostmapRecovery`, {_BEHAVIOUR} `layer_names` lists the"
-        " layers that are cleared; the obstacle layers if unset.",
-        TABLES[CLEAR],
-    ),
-    (
-        "RotateRecovery",
-        f"`rotate_recovery/RotateRecovery`, {_BEHAVIOUR} Speeds and accelerations are those of"
-        " TrajectoryPlannerROS.",
-        TABLES[ROTATE],
-    ),
-    (
-        "MoveSlowAndClear",
-        f"`move_slow_and_clear/MoveSlowAndClear`, {_BEHAVIOUR} It clears the obstacle layers around"
-        " the robot and limits all speeds of the local planner until the robot has moved away.",
-        TABLES[MOVE_SLOW],
-    ),
-)
+_PLANNERS = {
+    DEFAULT_LOCAL_PLANNER: "The local planner `{}`.",
+    DWA_PLANNER: "The local planner `{}`.",
+    DEFAULT_GLOBAL_PLANNER: "The global planner `{}`.",
+    SEARCH_PLANNER: "The global planner `{}`.",
+    CARROT: "The global planner `{}`: a straight line to the goal.",
+}
+_RECOVERIES = {
+    CLEAR: f"`{{}}`, {_BEHAVIOUR} `layer_names` lists the layers that are cleared; the obstacle"
+    " layers if unset.",
+    ROTATE: f"`{{}}`, {_BEHAVIOUR} Speeds and accelerations are those of TrajectoryPlannerROS.",
+    MOVE_SLOW: f"`{{}}`, {_BEHAVIOUR} It clears the obstacle layers around the robot and limits"
+    " all speeds of the local planner until the robot has moved away.",
+}
+
+
+def _sections() -> Iterator[Tuple[str, str, Table]]:
+    """Yield title, text and table of each section."""
+    yield "move_base", "At the node's level.", MOVE_BASE_TABLE
+    for name, text in _PLANNERS.items():
+        yield plugin_name(name), text.format(name), {**GLOBAL_PLANNERS, **LOCAL_PLANNERS}[name]
+    text = "Our own: `upstream: true` restores [upstream bugs](upstream_bugs.md)."
+    yield FIXES, text, GROUPS[FIXES]
+    yield "peers", "Our own: see [avoidance between robots](peers.md).", GROUPS["peers"]
+    yield "Costmaps", "In `global_costmap` and `local_costmap`.", COSTMAP_TABLE
+    for kind in _LAYERS:
+        name = f"costmap_2d::{kind}Layer"
+        yield f"{kind} layer", f"`{name}`.", LAYERS[name]
+        if kind == "Voxel":
+            text = "Each name in `observation_sources` is a namespace in the layer's."
+            yield "Sources", text, SOURCE_TABLE
+    for name, text in _RECOVERIES.items():
+        yield plugin_name(name), text.format(name), TABLES[name]
 
 
 def reference() -> str:
     """Return the page as Markdown."""
     parts = [_HEAD]
-    for title, text, table in _SECTIONS:
+    for title, text, table in _sections():
         parts.append(f"\n## {title}\n\n{text}\n\n" + "\n".join(_rows(table)) + "\n")
     return "".join(parts)
 

@@ -1,7 +1,7 @@
 """Read the parameters of one robot from whatever the user names as its configuration.
 
 Both shells read configurations here: ``quad fly`` and the nodes of a fleet call ``robot_tree``,
-and ``launch/quad.launch`` runs ``quad_nav.scenario.robot_parameters``, which prints its result.
+and the launch files run ``quad_nav.scenario.robot_parameters``, which prints its result.
 Layouts other than that of the launch files, and configurations of other robots, need modules that
 load slowly; those are imported when they are needed.
 """
@@ -17,9 +17,9 @@ from quad_nav.config.files import (
     COSTMAPS,
     ParameterTree,
     PlacedFile,
+    files_of,
     load_files,
     merge_tree,
-    placed_files,
     set_value,
 )
 from quad_nav.errors import InputError
@@ -40,7 +40,6 @@ class RobotSource:
         config: A shipped configuration, a folder or files, see ``sources``.
         number: Number of the robot.
         robots: Number of robots that fly together; None if they are not to be told.
-        numbered: Read only files with the robot's number in their names.
         override: File that is loaded last, with paths relative to the node.
         parameters: (path, value) on top of the files.
     """
@@ -48,7 +47,6 @@ class RobotSource:
     config: str
     number: int
     robots: Optional[int] = None
-    numbered: bool = False
     override: Optional[Path] = None
     parameters: Sequence[Tuple[str, Any]] = ()
 
@@ -115,10 +113,8 @@ def _configuration(source: RobotSource) -> ParameterTree:
     """Load the files of a configuration."""
     name, number = source.config, str(source.number)
     folder = Path(name).expanduser()
-    if source.numbered or (not folder.exists() and is_shipped(name)):
-        return load_files(
-            placed_files(config_folder(name), {"i": number}, source.numbered), {"i": number}
-        )
+    if not folder.exists() and is_shipped(name):
+        return load_files(files_of(config_folder(name), number), {"i": number})
     from quad_nav.config.sources import load_set, robot_set
 
     return load_set(robot_set(name, number))

@@ -12,7 +12,7 @@ import os
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Callable, Dict, Optional, Sequence
+from typing import Any, Callable, Dict, Sequence
 
 from quad_nav.config.files import SUBSTITUTION
 from quad_nav.errors import InputError, QuadError
@@ -152,7 +152,10 @@ class Substitution:
             return rest
         if name in ("env", "optenv"):
             variable, _, default = rest.partition(" ")
-            return self._env(variable, default if name == "optenv" else None)
+            value = os.environ.get(variable, default if name == "optenv" else None)
+            if value is None:
+                raise Unresolved(f"the environment variable {variable} is not set")
+            return value
         if name == "eval":
             return str(self._evaluated(rest))
         raise Unresolved(f"unknown $({inner})")
@@ -161,12 +164,6 @@ class Substitution:
         if name not in self.arguments:
             raise Unresolved(f"$(arg {name}) has no value; add {name}=VALUE after the file and :")
         return self.arguments[name]
-
-    def _env(self, name: str, default: Optional[str]) -> str:
-        value = os.environ.get(name, default)
-        if value is None:
-            raise Unresolved(f"the environment variable {name} is not set")
-        return value
 
     def _package(self, name: str) -> Path:
         """Return the folder of a package: around the launch file, then ROS's package path."""
@@ -181,7 +178,10 @@ class Substitution:
         for folder in above:
             if folder.name == name or self._package_name(folder) == name:
                 return folder
-        roots = [*above, *map(Path, filter(None, _package_path().split(os.pathsep)))]
+        roots = [
+            *above,
+            *map(Path, filter(None, os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep))),
+        ]
         for root in roots:
             for found in (root / name, *sorted(root.glob(f"*/{name}"))):
                 if found.is_dir():
@@ -232,12 +232,7 @@ class Substitution:
         raise ValueError(f"{type(node).__name__} is not supported")
 
     def _call(self, name: str, arguments: Any) -> Any:
-        plain: Dict[str, Callable[..., Any]] = {
-            "int": int,
-            "float": float,
-            "str": str,
-            "bool": bool,
-        }
+        plain: Dict[str, Any] = {"int": int, "float": float, "str": str, "bool": bool}
         if name in plain:
             if name in ("int", "float") and len(str(arguments)) > MAX_EXPRESSION:
                 raise ValueError(f"{name}() of more than {MAX_EXPRESSION} characters")
@@ -261,10 +256,6 @@ def _converted(word: str) -> Any:
         except ValueError:
             continue
     return word
-
-
-def _package_path() -> str:
-    return os.environ.get("ROS_PACKAGE_PATH", "")
 
 
 def is_package(folder: Path) -> bool:

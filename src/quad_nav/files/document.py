@@ -24,7 +24,7 @@ def read_yaml(path: Path) -> Any:
         InputError: The file cannot be read, or is not YAML; with the line.
     """
     try:
-        return yaml.load(read_text(path, MAX_BYTES), Loader=_Loader)
+        return yaml.load(read_text(path, MAX_BYTES), Loader=_Loader)  # noqa: S506, it is a SafeLoader
     except yaml.YAMLError as error:
         raise InputError([f"{path}: {yaml_fault(error)}"]) from error
 

@@ -148,7 +148,12 @@ def _view(
     now_s: float,
 ) -> NavigatorView:
     navigator = robot.navigator
+    global_costmap, local_costmap = robot.costmaps
     has_goal = navigator.state is not State.IDLE
+
+    def shows(part: str) -> bool:
+        return has_goal and what.includes(part, number)
+
     return NavigatorView(
         number,
         navigator.state,
@@ -160,35 +165,27 @@ def _view(
         len(navigator.recoveries),
         robot.stopped_reason,
         navigator.peers.safety_radius_m,
-        _plan(robot, PLAN, number, what, now_s) if has_goal else None,
-        _plan(robot, LOCAL_PLAN, number, what, now_s) if has_goal else None,
+        _placed(robot, robot.plan, global_costmap, now_s) if shows(PLAN) else None,
+        _placed(robot, robot.local_plan, local_costmap, now_s) if shows(LOCAL_PLAN) else None,
         scan if what.includes(SCAN, number) else None,
         {
             part: _costmap(robot, costmap, now_s)
-            for part, costmap in (
-                (GLOBAL_COSTMAP, navigator.global_costmap),
-                (LOCAL_COSTMAP, navigator.local_costmap),
-            )
+            for part, costmap in zip((GLOBAL_COSTMAP, LOCAL_COSTMAP), robot.costmaps)
             if what.includes(part, number)
         },
         _track(robot, now_s) if what.includes(TRACK, number) else None,
     )
 
 
-def _plan(
-    robot: LoopRobot, part: str, number: int, what: Inspection, now_s: float
+def _placed(
+    robot: LoopRobot, plan: Optional[NDArray[np.float64]], costmap: LayeredCostmap, now_s: float
 ) -> Optional[NDArray[np.float64]]:
     """Return a plan in ``map``, float64[n, 2]."""
-    if not what.includes(part, number):
-        return None
-    navigator = robot.navigator
-    plan, costmap = robot.plan, navigator.global_costmap
-    if part == LOCAL_PLAN:
-        plan, costmap = robot.local_plan, navigator.local_costmap
     if plan is None or not len(plan):
         return None
-    map_from_frame = robot.map_from(costmap.params.global_frame, now_s)
-    placed: NDArray[np.float64] = map_from_frame.transform_points(plan[:, :2])
+    placed: NDArray[np.float64] = robot.map_from(
+        costmap.params.global_frame, now_s
+    ).transform_points(plan[:, :2])
     return placed
 
 

@@ -11,16 +11,14 @@ to the loop as its ``GroupFactory``.
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 from typing import Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from quad_nav.config import Configuration
 from quad_nav.costmap.layered import LayeredCostmap
-from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, sinks_of
+from quad_nav.costmap.scan_intake import SensorPose, Sink, sinks_of
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.loop import LoopSetup
 from quad_nav.navigator.tick import RobotPoses, Tick
@@ -28,11 +26,7 @@ from quad_nav.peers.peer import Intention, Peer, idle_priority
 from quad_nav.plan.global_planner import SearchPlanner
 from quad_nav.plan.navfn import Navfn
 from quad_nav.plan.wavefront import Wavefront
-from quad_nav.scenario.assembly import (
-    build_navigator,
-    build_scan_filters,
-    reconfigure_robot,
-)
+from quad_nav.scenario.navigator_host import NavigatorHost
 from quad_nav.scenario.scene_map import SceneMaps
 from quad_nav.sim.casters import Lidars
 from quad_nav.sim.lidar import base_from_lidar
@@ -67,109 +61,73 @@ class NavigatorResult:
     intention: Optional[Intention]
 
 
-class LoopRobot:
-    """One robot's navigator in the loop: scans, poses and goals in, ticks out.
+class LoopRobot(NavigatorHost):
+    """One robot's navigator in the loop: scans, poses and goals in ``map`` in, ticks out.
 
     Attributes:
-        navigator: The navigator.
-        scan_filters: Filters of its scans.
-        intakes: Intakes of the robot's sensors.
         waiting_goal: The last goal that was sent, in ``map``, until the navigator takes it.
         due_s: Time before which no tick is due, unless a goal waits. Who changes the navigator
             between ticks sets it to -inf.
-        plan: The last global plan, float64[n, 3] in its costmap's frame, None before the first.
-        local_plan: The last local plan, the same.
-        limited_by: Name of the peer that limited the last command, "" if none did.
-        stopped_reason: Why the robot stops for lack of data, "" if it does not.
-        cycle_wall_s: Wall time of the last tick with a control cycle, None before the first.
     """
 
     def __init__(
         self, configuration: Configuration, number: int, frames: OdomFrames, start_s: float = 0.0
     ) -> None:
-        """Build the navigator of robot ``number``.
-
-        Args:
-            configuration: Its parameters.
-            number: Number of the robot.
-            frames: Odometry frames of all robots.
-            start_s: Time at which they began to drift.
-        """
-        self.navigator = build_navigator(configuration, number)
+        """Build the navigator of robot ``number``; the ``frames`` drift from ``start_s`` on."""
+        super().__init__(configuration, number)
         self.waiting_goal: Optional[Pose2D] = None
         self.due_s = -math.inf
-        self.plan: Optional[NDArray[np.float64]] = None
-        self.local_plan: Optional[NDArray[np.float64]] = None
-        self.limited_by = self.stopped_reason = ""
-        self.cycle_wall_s: Optional[float] = None
         self._number, self._frames, self._start_s = number, frames, start_s
-        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
-        self.scan_filters = build_scan_filters(configuration)
-        local_frame = costmaps[1].params.global_frame
-        self._intake = ScanIntake(sinks_of(costmaps), self.scan_filters, local_frame)
-        self.intakes = [self._intake]
+        self._lidar = self.new_intake(self.lidar_sinks())
+
+    def lidar_sinks(self) -> List[Sink]:
+        """List the sources of layers that are the simulated LIDAR."""
+        return sinks_of(self.costmaps)
 
     def reconfigure(self, configuration: Configuration) -> None:
         """Change every parameter that may change in flight."""
-        reconfigure_robot(configuration, self.navigator, self.scan_filters, self.intakes)
+        super().reconfigure(configuration)
         self.due_s = -math.inf
 
     def add_scan(self, scan: Scan, map_from_lidar: Pose3D, now_s: float) -> str:
         """Hand a scan that arrives now to the costmaps; return why not, "" if they have it."""
-        sinks = self._intake.sinks
+        sinks = self._lidar.sinks
         if self._frames.are_fixed:
             poses = [SensorPose(map_from_lidar, map_from_lidar)] * len(sinks)
         else:
             in_costmaps = self._in_costmaps(map_from_lidar, now_s)
             at = {frame: SensorPose(pose, pose) for frame, pose in in_costmaps.items()}
             poses = [at[sink.costmap.params.global_frame] for sink in sinks]
-        return self._intake.add_scan(scan, poses, scan.stamp_s, now_s)
+        return self._lidar.add_scan(scan, poses, scan.stamp_s, now_s)
 
     def is_due(self, now_s: float) -> bool:
         """Set the waiting goal if the navigator accepts it; return True if a tick is due."""
-        navigator = self.navigator
-        if self.waiting_goal is not None and navigator.accepts_goal(now_s):
+        if self.waiting_goal is not None and self.navigator.accepts_goal(now_s):
             goal, map_from_global = self.waiting_goal, self.map_from_global(now_s)
             if map_from_global != _IDENTITY:
                 goal = goal.relative_to(map_from_global)
-            navigator.set_goal(goal, now_s)
+            self.navigator.set_goal(goal, now_s)
             self.waiting_goal = None
-        self.due_s = -math.inf if navigator.has_work else navigator.next_due_s
+        self._note_due()
         return is_due(self.due_s, now_s)
+
+    def _note_due(self) -> None:
+        self.due_s = -math.inf if self.navigator.has_work else self.navigator.next_due_s
 
     def navigate(
         self, now_s: float, state: RobotState, peers: Sequence[Peer]
     ) -> Tuple[Tick, RobotPoses]:
-        """Tick the navigator; also return the poses that it was given.
-
-        Args:
-            now_s: Simulated time.
-            state: State of the robot.
-            peers: The other robots, in ``map``.
-        """
-        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
-        for costmap in costmaps:
+        """Tick the navigator among peers in ``map``; also return the poses that it was given."""
+        for costmap in self.costmaps:
             if costmap.map_frames:
                 costmap.set_map_poses(self._map_poses(costmap, now_s))
         located = self._located(state.map_from_base, now_s)
         map_from_global = self.map_from_global(now_s)
         if map_from_global != _IDENTITY:
             peers = [peer.relative_to(map_from_global) for peer in peers]
-        tracks = self.scan_filters.tracks(now_s)
-        tick = self.navigator.tick(now_s, located, state.twist, peers, tracks)
-        self.due_s = -math.inf if self.navigator.has_work else self.navigator.next_due_s
-        self._remember(tick)
+        tick = self.tick(now_s, located, state.twist, peers)
+        self._note_due()
         return tick, located
-
-    def _remember(self, tick: Tick) -> None:
-        """Keep what a tick has only when it is new; see ``loop.inspection``."""
-        if tick.plan is not None or tick.planning_failed:
-            self.plan = tick.plan
-        if tick.cycle:
-            self.local_plan = None if tick.control is None else tick.control.local_plan
-            self.stopped_reason = tick.warnings[0] if tick.is_stopped else ""
-        if tick.command is not None:
-            self.limited_by = tick.limited_by
 
     def intention(self, now_s: float) -> Intention:
         """Return the navigator's intention in ``map``."""
@@ -183,9 +141,7 @@ class LoopRobot:
         self._frames, self._start_s = frames, start_s
         self.due_s = -math.inf
         if jumped_back:
-            for intake in self.intakes:
-                intake.reset()
-            self.navigator.restart(start_s)
+            self.restart(start_s)
 
     def map_from_global(self, now_s: float) -> Pose2D:
         """Return the pose of the global costmap's frame in ``map``."""
@@ -207,16 +163,14 @@ class LoopRobot:
             pose = map_from_base.to_2d()
             return RobotPoses(pose, pose)
         at = self._in_costmaps(map_from_base, now_s)
-        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
-        in_global, in_local = (at[one.params.global_frame].to_2d() for one in costmaps)
+        in_global, in_local = (at[one.params.global_frame].to_2d() for one in self.costmaps)
         return RobotPoses(in_global, in_local)
 
     def _in_costmaps(self, map_from_pose: Pose3D, now_s: float) -> Dict[str, Pose3D]:
         """Express a pose in ``map`` in the frames of the costmaps, by their names."""
-        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
         return {
             frame: pose_in(self.map_from(frame, now_s), map_from_pose)
-            for frame in dict.fromkeys(costmap.params.global_frame for costmap in costmaps)
+            for frame in dict.fromkeys(costmap.params.global_frame for costmap in self.costmaps)
         }
 
 
@@ -252,8 +206,8 @@ class NavigatorGroup:
         """Give static layers the scene's map."""
         maps = SceneMaps(self.setup.scene)
         for robot in self.robots.values():
-            maps.set_map_of(robot.navigator.global_costmap)
-            maps.set_map_of(robot.navigator.local_costmap)
+            for costmap in robot.costmaps:
+                maps.set_map_of(costmap)
 
     def new_robot(self, number: int) -> LoopRobot:
         """Build a robot's navigator; the planners of the group share their working memory."""
@@ -320,26 +274,15 @@ class NavigatorGroup:
     def tick(
         self, number: int, now_s: float, states: RobotStates, peers: Sequence[Peer]
     ) -> NavigatorResult:
-        """Tick one navigator.
-
-        Args:
-            number: Number of the robot.
-            now_s: Simulated time.
-            states: States of all robots.
-            peers: The peers in reach, in ``map``.
-        """
+        """Tick navigator ``number`` among the peers in reach, in ``map``."""
         robot = self.robots[number]
-        start_s = time.perf_counter()
         tick, located = robot.navigate(now_s, states[number], peers)
         intention = robot.intention(now_s)
-        wall_s = time.perf_counter() - start_s
-        if tick.cycle:
-            robot.cycle_wall_s = wall_s
         return NavigatorResult(
             number,
             tick,
             located,
-            wall_s,
+            robot.wall_s,
             robot.waiting_goal is not None,
             None if intention.is_same(self.intentions[number]) else intention,
         )

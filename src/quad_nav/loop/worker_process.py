@@ -15,7 +15,7 @@ import sys
 import threading
 import traceback
 from multiprocessing.connection import Connection
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,8 +130,8 @@ class WorkerProcess:
         self._shared = SharedStates(len(setup.names), len(setup.scene.moving_shapes), context)
         self._pipe, worker_end = context.Pipe()
         parent_end = self._pipe if start_method == "fork" else None
-        work = _WorkerSetup(setup, self.robots, make_group, self._shared, whole_ticks)
-        arguments = os.getcwd(), _serve, worker_end, parent_end, work
+        worker = _Worker(setup, self.robots, make_group, self._shared, whole_ticks)
+        arguments = os.getcwd(), _serve, worker_end, parent_end, worker
         self._process = context.Process(  # type: ignore[attr-defined]
             target=in_folder, args=arguments, name=PROCESS_NAME, daemon=True
         )
@@ -291,24 +291,14 @@ class WorkerProcess:
         return answer
 
 
-class _WorkerSetup(NamedTuple):
-    """Set-up of a worker process."""
-
-    setup: LoopSetup
-    robots: Tuple[int, ...]
-    make_group: GroupFactory
-    shared: SharedStates
-    whole_ticks: bool
-
-
-def _serve(pipe: Connection, parent_end: Optional[Connection], given: _WorkerSetup) -> None:
+def _serve(pipe: Connection, parent_end: Optional[Connection], worker: _Worker) -> None:
     """Run orders from the pipe until an empty one comes or the parent process dies."""
     if parent_end is not None:
         parent_end.close()  # with a copy open, the parent's death would not close the pipe
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process handles Ctrl-C
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     try:
-        worker = _Worker(given)
+        worker.start()
         pipe.send(_READY)
         for name, *arguments in iter(pipe.recv, ()):
             answer = getattr(worker, name)(*arguments)
@@ -324,13 +314,24 @@ def _serve(pipe: Connection, parent_end: Optional[Connection], given: _WorkerSet
 
 
 class _Worker:
-    """The orders of a worker process."""
+    """The orders of a worker process, which starts it."""
 
-    def __init__(self, given: _WorkerSetup) -> None:
-        self._setup, self._shared = given.setup, given.shared
-        self._pack = (lambda result: result) if given.whole_ticks else _packed
-        self.group = given.make_group(given.setup, given.robots, self._lidars(given.setup.seed))
-        self.group.lidar_enabled = given.shared.lidar_enabled
+    group: NavigatorGroup
+
+    def __init__(
+        self,
+        setup: LoopSetup,
+        robots: Tuple[int, ...],
+        make_group: GroupFactory,
+        shared: SharedStates,
+        whole_ticks: bool,
+    ) -> None:
+        self._setup, self._robots, self._make_group = setup, robots, make_group
+        self._shared, self._whole_ticks = shared, whole_ticks
+
+    def start(self) -> None:
+        self.group = self._make_group(self._setup, self._robots, self._lidars(self._setup.seed))
+        self.group.lidar_enabled = self._shared.lidar_enabled
 
     def _lidars(self, seed: int) -> Lidars:
         setup, params = self._setup, self._setup.simulation
@@ -353,7 +354,9 @@ class _Worker:
         for robot, intention in intentions.items():
             self.group.intentions[robot] = intention
         results = self.group.navigate(now_s, self._states(slot), goals)
-        return self.group.due_s, [self._pack(result) for result in results]
+        if not self._whole_ticks:
+            return self.group.due_s, [_packed(result) for result in results]
+        return self.group.due_s, results
 
     def inspect(self, what: Inspection, now_s: float) -> List[NavigatorView]:
         return inspect_group(self.group, what, now_s)

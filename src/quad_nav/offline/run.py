@@ -43,21 +43,23 @@ def fly(
     wall_time_s = time.perf_counter() - start_wall_s
     flight.end("; ".join(reasons))
     # Observers may fail at the end, for example a recording that is closed on a full disk.
-    summary = _summary(flight, list(dict.fromkeys([*reasons, *flight.stop_reasons])), wall_time_s)
+    reason = "; ".join(dict.fromkeys([*reasons, *flight.stop_reasons]))
+    summary = summary_of(flight, reason, wall_time_s)
     if mistake is not None:
         mistake.summary = summary
         raise mistake
     return summary
 
 
-def _summary(flight: Flight, reasons: Sequence[str], wall_time_s: float) -> MissionSummary:
+def summary_of(flight: Flight, reason: str, wall_time_s: float) -> MissionSummary:
+    """Summarize a flight up to now; ``reason`` says why it ended early, "" if it did not."""
     return summarize(
         flight.log,
         {robot.name: robot.sequencer for robot in flight.robots},
         flight.now_s,
         sim_time_s=flight.now_s,
         wall_time_s=wall_time_s,
-        reason="; ".join(reasons),
+        reason=reason,
         seed=flight.setup.seed,
     )
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import signal
-from typing import Any, Callable, Iterable, Iterator, Optional, Protocol, Sequence, Tuple, TypeVar
+from typing import Any, Callable, Iterable, Iterator, Optional, Sequence, Tuple, TypeVar, Union
 
 import joblib
 from joblib.externals.loky.process_executor import TerminatedWorkerError
@@ -31,23 +31,12 @@ class WorkerDied(Exception):
     """A worker died; its flights have no result."""
 
 
-class Workers(Protocol):
-    """Processes that fly tasks; ``count`` at the same time."""
-
-    count: int
-
-    def run(
-        self, function: Callable[[Task], Result], tasks: Iterable[Tuple[int, Task]]
-    ) -> Iterator[Tuple[int, Result]]:
-        """Yield each task's number and result as soon as it is there.
-
-        Raises:
-            WorkerDied: A worker died; tasks without a result may be run again.
-        """
-
-
 class LocalWorkers:
-    """Processes on this machine, one per core by default; one worker is this process."""
+    """Processes on this machine, one per core by default; one worker is this process.
+
+    Attributes:
+        count: Number of tasks at the same time.
+    """
 
     def __init__(self, count: Optional[int] = None) -> None:
         self.count = int(joblib.cpu_count()) if count is None else count
@@ -109,29 +98,20 @@ class RayWorkers:
                     "cluster, as 10.0.0.1:6379"
                 ]
             ) from error
-        self._ray_error: Any = ray.exceptions.RayError
-        self._register()
-        self.count = count or int(ray.cluster_resources().get("CPU", 1))
-
-    @staticmethod
-    def _register() -> None:
-        """Register Ray's backend of joblib with results one by one."""
         from ray.util.joblib.ray_backend import RayBackend
 
         class StreamingRayBackend(RayBackend):
-            # Its pool calls back for every result, which is all that this needs.
+            # Its pool calls back for every result, which is all that results one by one need.
             supports_return_generator = True
 
         joblib.register_parallel_backend(_RAY_BACKEND, StreamingRayBackend)
+        self._ray_error: Any = ray.exceptions.RayError
+        self.count = count or int(ray.cluster_resources().get("CPU", 1))
 
     def run(
         self, function: Callable[[Task], Result], tasks: Iterable[Tuple[int, Task]]
     ) -> Iterator[Tuple[int, Result]]:
-        """Yield each task's number and result as soon as it is there.
-
-        Raises:
-            WorkerDied: A worker died, or the cluster failed.
-        """
+        """See ``LocalWorkers.run``; a failure of the cluster counts as the death of a worker."""
         try:
             with joblib.parallel_config(_RAY_BACKEND):
                 parallel = joblib.Parallel(
@@ -142,6 +122,9 @@ class RayWorkers:
                 )
         except self._ray_error as error:
             raise WorkerDied from error
+
+
+Workers = Union[LocalWorkers, RayWorkers]
 
 
 def fly_all(

@@ -8,7 +8,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from quad_nav.config.difference_table import difference_list, number_text
+from quad_nav.config.differences import difference_list, number_text
 from quad_nav.recording.trace import FlightTrace, RobotTrace
 from quad_nav.report.flight_metrics import FlightMetrics, flight_metrics
 from quad_nav.report.plot import sample

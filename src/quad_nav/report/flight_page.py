@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import List, Optional, Sequence
 
-from quad_nav.config.difference_table import parameter_rows
+from quad_nav.config.differences import parameter_rows
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report import style
 from quad_nav.report.distances import distance_panels, speed_panel

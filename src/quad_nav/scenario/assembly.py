@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Callable, Dict, Iterable, Optional
+from typing import Any, Callable, Dict, Optional
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,6 @@ from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.peer_layer import PeerLayerParams
 from quad_nav.costmap.scan_filter import ScanFilter, ScanFilters
-from quad_nav.costmap.scan_intake import ScanIntake
 from quad_nav.costmap.scan_validator import ScanValidator
 from quad_nav.geometry import Pose2D
 from quad_nav.navigator.command_filter import CommandFilter, VoronoiCell
@@ -105,28 +104,6 @@ def _command_filter(kind: FilterType) -> CommandFilter:
         made: CommandFilter = kind.make()
         return made
     return VoronoiCell()
-
-
-def reconfigure_robot(
-    configuration: Configuration,
-    navigator: Navigator,
-    filters: ScanFilters,
-    intakes: Iterable[ScanIntake],
-) -> None:
-    """Change every parameter of a robot that may change in flight; plan and goal stay.
-
-    Args:
-        configuration: The configuration from now on.
-        navigator: The robot's navigator.
-        filters: Its scan filters.
-        intakes: Those of all of its sensors.
-    """
-    apply_configuration(navigator, configuration)
-    for scan_filter in filters.filters:
-        if isinstance(scan_filter, ScanValidator):
-            scan_filter.params = configuration.scan_validator
-    for intake in intakes:
-        intake.reconfigure()
 
 
 def apply_configuration(navigator: Navigator, configuration: Configuration) -> None:

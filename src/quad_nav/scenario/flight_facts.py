@@ -10,7 +10,7 @@ import math
 from pathlib import Path
 from typing import Any, Dict, Mapping, Optional, Sequence
 
-from quad_nav.config.difference_table import Trees, difference_list
+from quad_nav.config.differences import Trees, difference_list
 from quad_nav.files.shipped import shipped
 from quad_nav.files.values import is_number
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup

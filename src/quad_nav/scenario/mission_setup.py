@@ -12,7 +12,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
-from quad_nav import config
 from quad_nav.config import Configuration
 from quad_nav.errors import InputError
 from quad_nav.files.output import output_faults
@@ -22,6 +21,7 @@ from quad_nav.mission.goal_file import SETTINGS, SequenceSettings, read_settings
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.scenario.coverage import scene_bounds
 from quad_nav.scenario.flight_facts import ros_facts
+from quad_nav.scenario.navigator_parameters import load_navigator
 from quad_nav.scenario.rules import RANDOM, RULES, START_S, optional
 from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configurations, read_scenario
 from quad_nav.sim.crowd_record import CrowdRecord
@@ -196,7 +196,9 @@ class _Navigators:
             tree = self._all_parameters.get(f"move_base{number}")
             try:
                 configurations.append(
-                    None if tree is None else config.load(tree, f"/move_base{number}")
+                    None
+                    if tree is None
+                    else load_navigator(tree, f"/move_base{number}", self._all_parameters)
                 )
             except InputError as error:
                 problems += error.problems

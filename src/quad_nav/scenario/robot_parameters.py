@@ -73,9 +73,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--config", required=True, help="folder, or name of a shipped one")
     parser.add_argument("--robot", type=int, required=True, help="number of the robot")
     parser.add_argument("--robots", type=int, help="number of robots that fly together")
-    parser.add_argument(
-        "--numbered", default="false", help="true: read only files with the robot's number"
-    )
     parser.add_argument("--override", default="", help="file that is loaded last")
     parser.add_argument("--scene", default="", help="file of the scene that the costmap covers")
     parser.add_argument("--seed", type=int, default=0, help="seed of a random scene")
@@ -107,7 +104,6 @@ def _source(given: argparse.Namespace) -> RobotSource:
         given.config,
         given.robot,
         given.robots,
-        given.numbered.lower() in ("true", "1"),
         Path(given.override) if given.override else None,
     )
 

@@ -11,6 +11,7 @@ from quad_nav.config import Configuration, load
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.errors import InputError
 from quad_nav.files.values import is_number, is_whole, unknown_names, value_faults
+from quad_nav.scenario.navigator_parameters import load_navigator
 from quad_nav.scenario.rules import RULES, optional, optional_whole, steps_per_scan
 from quad_nav.scenario.scenario import (
     area_of,
@@ -164,9 +165,8 @@ def _on_the_server(
     problems: List[str] = []
     for number in numbers:
         try:
-            found[number] = load(
-                all_parameters.get(f"move_base{number}", {}), f"/move_base{number}"
-            )
+            tree = all_parameters.get(f"move_base{number}", {})
+            found[number] = load_navigator(tree, f"/move_base{number}", all_parameters)
         except InputError as error:
             problems += error.problems
     if problems:

@@ -25,7 +25,7 @@ from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import RobotPoses
 from quad_nav.peers.peer import HIGHEST_PRIORITY, Intention, Peer
-from quad_nav.scenario.assembly import build_navigator, build_scan_filters
+from quad_nav.scenario.navigator_host import NavigatorHost
 
 _AHEAD_M = 1.0
 _LIDAR: Dict[str, Any] = {
@@ -60,21 +60,20 @@ _MISSIONS: Tuple[Tuple[Dict[str, Any], Dict[str, Any]], ...] = (  # costmap, the
 
 def warm_up(configuration: config.Configuration) -> None:
     """Fly a second of a small mission with a navigator of this configuration."""
-    navigator = build_navigator(configuration)
+    host = NavigatorHost(configuration)
+    navigator = host.navigator
     spec = navigator.global_costmap.spec
     here = Pose2D(
         spec.origin_x_m + 0.5 * spec.size_x * spec.resolution_m,
         spec.origin_y_m + 0.5 * spec.size_y * spec.resolution_m,
     )
-    filters = build_scan_filters(configuration)
     _add_scans(navigator, here)
-    _filter_scans(filters, here)
+    _filter_scans(host.scan_filters, here)
     navigator.set_goal(Pose2D(here.x_m + _AHEAD_M, here.y_m), 0.0)
-    tracks = filters.tracks(1.0)
     for now_s in (0.0, 0.5):
-        navigator.tick(now_s, RobotPoses(here, here), Twist2D(vx_mps=0.1), (), tracks)
+        host.tick(now_s, RobotPoses(here, here), Twist2D(vx_mps=0.1), ())
     peers = [_oncoming_peer(here, 1.0)]
-    navigator.tick(1.0, RobotPoses(here, here), Twist2D(vx_mps=0.1), peers, tracks)
+    host.tick(1.0, RobotPoses(here, here), Twist2D(vx_mps=0.1), peers)
     _add_scans(navigator, here)  # again, with the points of a peer to remove
     if isinstance(navigator.controller, TrajectoryPlanner) and navigator.controller.rollout:
         navigator.controller.rollout.score(np.zeros((1, 3)))  # of strafing, the last resort
@@ -124,8 +123,9 @@ def simulate() -> None:
     """
     from quad_nav.sim.map_file import rectangles_of
     from quad_nav.sim.motion import Motion, Walkers
+    from quad_nav.sim.obstacles import Cylinder
     from quad_nav.sim.robot_state import RobotStates
-    from quad_nav.sim.scene import Cylinder, MovingObstacle, Scene, Walls
+    from quad_nav.sim.scene import MovingObstacle, Scene, Walls
     from quad_nav.sim.simulation import Simulation
 
     rectangles_of(np.ones((2, 2), np.bool_))

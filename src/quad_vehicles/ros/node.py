@@ -24,6 +24,7 @@ from quad_nav.mission.respawn import RESPAWNED
 from quad_nav.ros.common.conversions import twist_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings, publish_health
 from quad_nav.ros.common.readiness import init_node
+from quad_nav.ros.common.rospy_repairs import sender_of
 from quad_nav.topics.health import Health
 from quad_nav.topics.validation import CommandLease, twist_problem
 from quad_nav.topics.vehicle_states import IN_FLIGHT, State
@@ -184,7 +185,7 @@ class VehicleNode:
         twist = twist_from_message(message)
         problem = twist_problem(twist)
         if not problem:
-            node = excerpt(message._connection_header.get("callerid", "an unnamed node"))
+            node = excerpt(sender_of(message) or "an unnamed node")
             holder = self._lease.holder(self._vehicle.number, node, time.monotonic())
             if holder == node:
                 self._bridge.follow(twist)

@@ -9,7 +9,8 @@ from geometry_msgs.msg import PoseArray
 from numpy.typing import NDArray
 
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
-from quad_nav.sim.scene import Obstacle, Scene
+from quad_nav.sim.obstacles import Obstacle
+from quad_nav.sim.scene import Scene
 from quad_nav.topics.obstacle_poses import POSES_TOPIC, moving_poses
 from quad_web.ros.intake import Newest, Topic
 from quad_web.view.items import ObstacleItems, moving_solids

@@ -19,6 +19,7 @@ from quad_nav.errors import InputError, excerpt
 from quad_nav.geometry import yaw_from_quaternion
 from quad_nav.mission.actions import Event
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
+from quad_nav.ros.common.rospy_repairs import topic_of
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.topics.contacts import CONTACTS_TOPIC, contact_from_message
@@ -240,6 +241,6 @@ class FlightReports:
 
 def _origin(message: Any) -> Tuple[Optional[int], str]:
     """Return the number of the robot whose topic a message came from, and the name below it."""
-    topic = message._connection_header.get("topic", "")
+    topic = topic_of(message)
     found = re.match(r"/move_base(\d{1,4})/", topic)
     return (int(found[1]), topic[found.end() :]) if found else (None, "")

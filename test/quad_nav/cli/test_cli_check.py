@@ -11,7 +11,7 @@ from quad_nav.cli import main
 from quad_nav.config import Remark
 from quad_nav.config.check import Report, check_files, check_source, report_text
 from quad_nav.config.file_sets import FileSet, file_sets
-from quad_nav.config.files import PlacedFile
+from quad_nav.config.files import COSTMAPS, PlacedFile
 
 CONFIG = Path(__file__).resolve().parents[3] / "config"
 SEEING = (
@@ -77,63 +77,58 @@ def test_every_robot_with_files_of_its_own(tmp_path):
     assert list(sets(tmp_path, "2")) == ["./robot 2"]
 
 
-def test_alternatives_make_sets_of_their_own(tmp_path):
-    write(
-        tmp_path,
-        {
-            "costmap_common_params_big.yaml": "robot_radius: 0.5",
-            "costmap_common_params_small.yaml": "robot_radius: 0.1",
-            "dwa_params_big.yaml": "DWAPlannerROS: {max_vel_x: 1.0}",
-            "dwa_params_small.yaml": "DWAPlannerROS: {max_vel_x: 2.0}",
-            "move_base_params.yaml": "controller_frequency: 5.0",
-            "local_costmap_params.yaml": "local_costmap: {width: 3}",
-        },
-    )
-    shared = ["local_costmap_params.yaml", "move_base_params.yaml"]
-    assert {name: set(files) for name, files in sets(tmp_path).items()} == {
-        f"./{name}": {f"costmap_common_params_{name}.yaml", f"dwa_params_{name}.yaml", *shared}
-        for name in ("big", "small")
-    }
+RADIUS, PLANNER, WIDTH = "robot_radius: 0.5", "DWAPlannerROS: {max_vel_x: 1.0}", "width: 3"
+RATE = "controller_frequency: 5.0"
 
 
-def test_names_of_alternatives_are_whole_words_or_numbers(tmp_path):
-    write(
-        tmp_path,
-        {
-            "costmap_common_cat.yaml": "robot_radius: 0.5",
-            "costmap_common_car.yaml": "robot_radius: 0.5",
-            "costmap_common_car_2.yaml": "robot_radius: 0.5",
-        },
-    )
-    assert list(sets(tmp_path)) == ["./car", "./car_2", "./cat"]
-    write(
-        tmp_path / "numbers",
-        {"costmap_common0.yaml": "robot_radius: 0.5", "costmap_common1.yaml": "robot_radius: 0.5"},
-    )
-    assert list(sets(tmp_path / "numbers")) == ["./0", "./1"]
-    assert list(sets(tmp_path / "numbers", "1")) == ["./1"]
-
-
-def test_folders_of_changes_come_after_what_they_change(tmp_path):
-    write(
-        tmp_path,
-        {
-            "costmap_common.yaml": "robot_radius: 0.5",
-            "costmap_local.yaml": "width: 3",
-            "one/costmap_common.yaml": "robot_radius: 0.1",
-            "one/costmap_local.yaml": "width: 4",
-            "two/move_base.yaml": "controller_frequency: 5.0",
-        },
-    )
-    assert sets(tmp_path) == {
-        "one": [
-            "costmap_common.yaml",
-            "one/costmap_common.yaml",
-            "costmap_local.yaml",
-            "one/costmap_local.yaml",
-        ],
-        "two": ["costmap_common.yaml", "costmap_local.yaml", "two/move_base.yaml"],
-    }
+@pytest.mark.parametrize(
+    "texts, expected",
+    [
+        (  # alternatives of one name belong together
+            {
+                "costmap_common_params_big.yaml": RADIUS,
+                "costmap_common_params_small.yaml": RADIUS,
+                "dwa_params_big.yaml": PLANNER,
+                "dwa_params_small.yaml": PLANNER,
+                "move.yaml": RATE,
+            },
+            {
+                f"./{name}": [f"costmap_common_params_{name}.yaml", f"dwa_params_{name}.yaml"]
+                + ["move.yaml"]
+                for name in ("big", "small")
+            },
+        ),
+        (  # their names are whole words
+            dict.fromkeys(["common_costmap_cat.yaml", "common_costmap_car_2.yaml"], RADIUS),
+            {"./car_2": ["common_costmap_car_2.yaml"], "./cat": ["common_costmap_cat.yaml"]},
+        ),
+        (  # or numbers
+            {"costmap_common0.yaml": RADIUS, "costmap_common1.yaml": RADIUS},
+            {"./0": ["costmap_common0.yaml"], "./1": ["costmap_common1.yaml"]},
+        ),
+        (  # folders of changes come after what they change
+            {
+                "costmap_common.yaml": RADIUS,
+                "costmap_local.yaml": WIDTH,
+                "one/costmap_common.yaml": RADIUS,
+                "one/costmap_local.yaml": WIDTH,
+                "two/move_base.yaml": RATE,
+            },
+            {
+                "one": [
+                    "costmap_common.yaml",
+                    "one/costmap_common.yaml",
+                    "costmap_local.yaml",
+                    "one/costmap_local.yaml",
+                ],
+                "two": ["costmap_common.yaml", "costmap_local.yaml", "two/move_base.yaml"],
+            },
+        ),
+    ],
+    ids=["alternatives", "words", "numbers", "folders"],
+)
+def test_sets_of_other_folders(tmp_path, texts, expected):
+    assert sets(write(tmp_path, texts)) == expected
 
 
 @pytest.mark.parametrize(
@@ -219,30 +214,22 @@ def test_table(tmp_path, monkeypatch):
   costmap_common_params.yaml, local_costmap_params.yaml, global_costmap_params.yaml,
   base_local_planner_params.yaml, move_base_params.yaml
 
-parameter                           kind     message                  nearest name
-----------------------------------  -------  -----------------------  -------------------------
-recovery_behaviour_enabled          unknown  nothing reads it         recovery_behavior_enabled
-  move_base_params.yaml:1
-TrajectoryPlannerROS/pdist_scale    renamed  old name of
-  base_local_planner_params.yaml:2           path_distance_bias
-TrajectoryPlannerROS/max_vel_x      clamped  25 clamped to 20.0, the
-  base_local_planner_params.yaml:3           largest that move_base
-                                             allows
+parameter                           kind     message
+----------------------------------  -------  -----------------------------------------------------
+recovery_behaviour_enabled          unknown  nothing reads it; did you mean
+  move_base_params.yaml:1                    recovery_behavior_enabled?
+TrajectoryPlannerROS/pdist_scale    renamed  old name of path_distance_bias
+  base_local_planner_params.yaml:2
+TrajectoryPlannerROS/max_vel_x      clamped  25 clamped to 20.0, the largest that move_base allows
+  base_local_planner_params.yaml:3
 *_costmap/zzz                       unknown  nothing reads it
   costmap_common_params.yaml:4"""
     )
 
 
 def test_all_errors_at_once_and_remarks_after_them(tmp_path):
-    write(
-        tmp_path,
-        {
-            **STANDARD,
-            "local_costmap_params.yaml": (
-                "local_costmap:\n  width: three\n  static_mapp: true\n  height: -1.0\n"
-            ),
-        },
-    )
+    local = "local_costmap:\n  width: three\n  static_mapp: true\n  height: -1.0\n"
+    write(tmp_path, {**STANDARD, "local_costmap_params.yaml": local})
     status, output = quad(tmp_path)
     assert status == 2
     assert f"{tmp_path}: 2 errors, 1 warning\n" in output
@@ -277,16 +264,7 @@ def test_missing_file(tmp_path):
 
 
 def test_the_robots_number(tmp_path):
-    write(
-        tmp_path,
-        {
-            **STANDARD,
-            "costmap_common_params.yaml": (
-                "observation_sources: scan\nscan: {data_type: LaserScan, topic: scan$(arg i)}\n"
-            ),
-        },
-    )
-    assert quad(tmp_path)[0] == 0
+    write(tmp_path, STANDARD)
     assert quad(tmp_path, "--robot", 3)[0] == 0
     assert quad(tmp_path, "--robot", -1)[0] == 2
     report = check_files([PlacedFile(tmp_path / "costmap_common_params.yaml", ())], "3")
@@ -313,19 +291,12 @@ def test_tables_keep_to_the_width(width):
     )
     text = report_text(Report(FileSet(None, "", (), "0"), lines), width)
     assert max(map(len, text.splitlines())) <= width
-    assert ("nearest name" in text) == (width == 100)
     assert "recovery_behavior_enabled" in text
 
 
 def test_remarks_that_differ_between_the_costmaps_are_not_merged(tmp_path):
-    write(
-        tmp_path,
-        {
-            **STANDARD,
-            "local_costmap_params.yaml": "local_costmap: {colour: 1}\n",
-            "global_costmap_params.yaml": "global_costmap: {colour: 1}\n",
-        },
-    )
+    colours = {f"{name}_params.yaml": f"{name}: {{colour: 1}}" for name in COSTMAPS}
+    write(tmp_path, {**STANDARD, **colours})
     ((report,), _) = check_source(tmp_path)
     assert [line.place for line in report.lines] == [
         "/global_costmap/colour",

@@ -57,27 +57,17 @@ def test_constants_of_the_options_are_those_of_the_engine():
     assert odometry.MAX_DRIFT == MAX_DRIFT
 
 
-@pytest.mark.parametrize(
-    "word, hint",
-    [
-        ("fli", "no command 'fli'; did you mean 'fly'?"),
-        ("reprot", "no command 'reprot'; did you mean 'report'?"),
-        ("zzz", "no command 'zzz'; see quad --help"),
-    ],
-)
+@pytest.mark.parametrize("word, hint", [("fli", "did you mean 'fly'?"), ("zzz", "see quad --help")])
 def test_unknown_command_names_the_nearest(word, hint):
     done = CliRunner().invoke(main, [word])
-    assert (done.exit_code, done.output.splitlines()[-1]) == (2, f"Error: {hint}")
+    assert done.exit_code == 2
+    assert done.output.splitlines()[-1] == f"Error: no command {word!r}; {hint}"
 
 
-def test_engine_prints_nothing_when_it_is_imported():
-    done = python("import quad_nav.sim.body")
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-
-
-def test_engine_is_imported_without_standard_error():
-    done = python("import os; os.close(2); import quad_nav.sim.body; print(1)")
-    assert (done.returncode, done.stdout) == (0, "1\n")
+def test_engine_prints_nothing_when_it_is_imported_also_without_standard_error():
+    for close in ("", "import os; os.close(2); "):
+        done = python(f"{close}import quad_nav.sim.body; print(1)")
+        assert (done.returncode, done.stdout, done.stderr) == (0, "1\n", "")
 
 
 @pytest.mark.parametrize(
@@ -106,16 +96,16 @@ def test_candidates_may_set_parameters_of_planners_that_others_choose():
     assert len(setup.robots) == 1
 
 
-def test_too_many_quadcopters_are_refused_before_a_mission_is_made():
-    done = CliRunner().invoke(main, ["fly", "--robots", "1000"])
-    assert done.exit_code == 2
-    assert "robots: is 1000; expected a whole number, 1 to 100" in done.output
-
-
-def test_an_arena_that_takes_minutes_to_fill_is_refused():
-    done = CliRunner().invoke(main, ["fly", "--robots", "3", "--size", "10000"])
-    assert done.exit_code == 2
-    assert "size: is 10000.0; expected a number of metres, 0 to 250" in done.output
+@pytest.mark.parametrize(
+    "words, fault",
+    [
+        ("--robots 1000", "robots: is 1000; expected a whole number, 1 to 100"),
+        ("--robots 3 --size 10000", "size: is 10000.0; expected a number of metres, 0 to 250"),
+    ],
+)
+def test_missions_that_take_minutes_to_make_are_refused(words, fault):
+    done = CliRunner().invoke(main, ["fly", *words.split()])
+    assert done.exit_code == 2 and fault in done.output
 
 
 @pytest.mark.parametrize("quiet", [[], ["-q"]])

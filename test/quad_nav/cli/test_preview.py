@@ -45,7 +45,9 @@ def write_goals(options, robot, goals):
 
 
 def test_costmap_is_that_of_the_whole_scene_with_the_configuration_s_inflation(hall):
-    costmap = MissionPreview(hall).costmap(0)
+    preview = MissionPreview(hall)
+    costmap = preview.costmap(0)
+    assert preview.costmap(1) is costmap  # equal robots share one
 
     def cost(x_m, y_m):
         column, row = costmap.spec.cell_of(x_m, y_m)
@@ -56,11 +58,6 @@ def test_costmap_is_that_of_the_whole_scene_with_the_configuration_s_inflation(h
     assert cost(0.01, 3.0) == LETHAL  # the wall's surface
     assert cost(2.5, 3.0) == 0
     assert 0 < cost(4.0 + 0.5 + costmap.inscribed_radius_m + 0.1, 3.0) < INSCRIBED
-
-
-def test_robots_with_equal_costmaps_share_one(hall):
-    preview = MissionPreview(hall)
-    assert preview.costmap(0) is preview.costmap(1)
 
 
 def test_plans_lead_from_goal_to_goal_around_obstacles(hall):
@@ -114,22 +111,16 @@ def test_a_goal_without_a_path_is_warned_about(hall):
     assert robot.warnings[0].startswith("quad0: goal 2 (7, 3.5): no path from goal 1 ")
 
 
-def test_a_scene_with_too_many_cells_is_shown_without_its_costmap(hall):
-    hall.scene.write_text(SCENE.replace("[8.0, 6.0]", "[80000.0, 60000.0]"))
+def test_a_rolling_costmap_covers_a_scene_without_too_many_cells(hall):
     rolling = replace(hall, parameters=(("global_costmap/rolling_window", True),))
+    spec = MissionPreview(rolling).costmap(0).spec
+    assert (spec.origin_x_m, spec.origin_y_m) == (-0.1, -0.1)
+    assert spec.size_x * spec.resolution_m == pytest.approx(8.2)
+    hall.scene.write_text(SCENE.replace("[8.0, 6.0]", "[80000.0, 60000.0]"))
     preview = MissionPreview(rolling)
     assert preview.costmap(0) is None
     assert preview.robot(0).warnings == (
         "quad0: no costmap and no plans: the scene has too many cells",
-    )
-
-
-def test_a_rolling_costmap_covers_the_scene(hall):
-    rolling = replace(hall, parameters=(("global_costmap/rolling_window", True),))
-    spec = MissionPreview(rolling).costmap(0).spec
-    assert (spec.origin_x_m, spec.origin_y_m) == (-0.1, -0.1)
-    assert (spec.size_x * spec.resolution_m, spec.size_y * spec.resolution_m) == pytest.approx(
-        (8.2, 6.2)
     )
 
 

@@ -15,15 +15,13 @@ from PIL import Image
 from study_flights import FLOWN, SCENE, SPACE, write_mission
 
 from quad_nav.cli import main
-from quad_nav.errors import InputError, printable
+from quad_nav.errors import printable
 from quad_nav.files.shipped import shipped
 from quad_nav.mission.flight_log import Leg
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.summary import MissionSummary, RobotSummary
 from quad_nav.mission.summary_table import table
-from quad_nav.recording import messages
 from quad_nav.sim.contacts import Contact
-from quad_nav.topics.flight_info import FlightInfo, RobotInfo, flight_info_from_message
 from quad_tune.flight_cache import FlightCache
 
 EVIL = "\x1b]0;owned\x07\x1b[2J\x9b31m\r\x08\x7f\u202ecod\u2066\u200e\nforged: all goals reached"
@@ -214,13 +212,6 @@ def test_messages_of_move_base_in_the_summary():
     robots = (RobotSummary("quad0", (leg, replace(leg, time_s=None))),)
     contacts = (Contact(1.0, "quad0", EVIL, 1.0, 2.0),)
     assert_harmless(table(MissionSummary(robots, contacts=contacts, reason=EVIL)))
-
-
-def test_recorded_flights_are_refused_in_one_line():
-    with pytest.raises((InputError, ValueError)) as raised:
-        robot = RobotInfo(EVIL, parameters={"local_costmap": {"plugins": {EVIL: 1}}})
-        flight_info_from_message(messages.flight_info(FlightInfo(EVIL, robots=(robot,))))
-    assert_harmless(printable(raised.value), shown=False)
 
 
 def test_printable():

@@ -32,35 +32,24 @@ def problems(*arguments):
 
 
 def test_common_goes_into_both_costmaps_and_the_own_file_wins(folder):
+    scan = {"topic": "scan7", "marking": True}
     assert load_files(folder, {"i": "7"}) == {
-        "global_costmap": {
-            "robot_radius": 0.35,
-            "width": 12.0,
-            "base_scan": {"topic": "scan7", "marking": True},
-        },
-        "local_costmap": {
-            "robot_radius": 0.2,
-            "width": 3.0,
-            "base_scan": {"topic": "scan7", "marking": True},
-        },
+        "global_costmap": {"robot_radius": 0.35, "width": 12.0, "base_scan": scan},
+        "local_costmap": {"robot_radius": 0.2, "width": 3.0, "base_scan": scan},
         "TrajectoryPlannerROS": {"max_vel_x": 0.3},
     }
 
 
-def test_move_base_file_and_the_robots_own_on_top(folder):
+def test_move_base_file_the_robots_own_on_top_and_sets_numbered_by_hand(folder):
     (folder / "move_base_params.yaml").write_text("controller_frequency: 5.0\n")
+    (folder / "local_costmap_params2.yaml").write_text("local_costmap: {width: 4.0}\n")
     (folder / "robot1.yaml").write_text(
         "controller_frequency: 9.0\nlocal_costmap: {base_scan: {marking: false}}\n"
     )
     one, two = (load_files(folder, {"i": number}) for number in "12")
     assert (one["controller_frequency"], two["controller_frequency"]) == (9.0, 5.0)
     assert one["local_costmap"]["base_scan"] == {"topic": "scan1", "marking": False}
-
-
-def test_sets_numbered_by_hand(folder):
-    (folder / "local_costmap_params0.yaml").write_text("local_costmap: {width: 4.0}\n")
-    assert load_files(folder, {"i": "0"})["local_costmap"]["width"] == 4.0
-    assert load_files(folder, {"i": "1"})["local_costmap"]["width"] == 3.0
+    assert (one["local_costmap"]["width"], two["local_costmap"]["width"]) == (3.0, 4.0)
 
 
 def test_list_of_files_in_the_order_given(folder):
@@ -71,12 +60,13 @@ def test_list_of_files_in_the_order_given(folder):
 
 
 def test_values_remember_their_file_and_line(folder):
-    (folder / "local_costmap_params.yaml").write_text("local_costmap:\n  width: three\n")
+    path = folder / "local_costmap_params.yaml"
+    path.write_text("local_costmap:\n  width: three\n")
     with pytest.raises(InputError) as caught:
         load(load_files(folder, {"i": "0"}), "/move_base0")
     assert caught.value.problems == [
-        f"/move_base0/local_costmap/width ({folder / 'local_costmap_params.yaml'}:2): 'three' is"
-        " not a number; expected a positive number of metres"
+        f"/move_base0/local_costmap/width ({path}:2): 'three' is not a number; expected a positive"
+        " number of metres"
     ]
 
 
@@ -92,41 +82,29 @@ def test_every_missing_file_is_named(tmp_path):
 
 
 def test_every_broken_file_is_named_with_its_line(folder):
-    (folder / "local_costmap_params.yaml").write_text("local_costmap:\n  width: [1\n")
-    (folder / "global_costmap_params.yaml").write_text("- a list\n")
-    told = problems(folder, {"i": "0"})
-    assert told[0].startswith(f"{folder / 'local_costmap_params.yaml'}:3:1: not YAML: ")
-    assert told[1] == (
-        f"{folder / 'global_costmap_params.yaml'}:1: not a mapping; expected names of parameters"
-        " with values"
-    )
-
-
-def test_tabs_are_a_yaml_error(folder):
-    (folder / "local_costmap_params.yaml").write_text("local_costmap:\n\twidth: 1\n")
-    (told,) = problems(folder, {"i": "0"})
-    assert told.startswith(f"{folder / 'local_costmap_params.yaml'}:2:1: not YAML: ")
-    assert "'\\t'" in told
-
-
-def test_unknown_substitution(folder):
-    (folder / "global_costmap_params.yaml").write_text("# $(arg i)\na: $(find quad)\nb: $(arg j)\n")
-    path = folder / "global_costmap_params.yaml"
-    assert problems(folder, {"i": "0"}) == [
-        f"{path}:2: unknown $(find quad); expected $(arg i)",
-        f"{path}:3: unknown $(arg j); expected $(arg i)",
-    ]
+    broken = {
+        "costmap_common": ("a:\n\tb: 1\n", "2:1: not YAML: "),  # a tab
+        "local_costmap": ("local_costmap:\n  width: [1\n", "3:1: not YAML: "),
+        "global_costmap": ("- 1\n", "1: not a mapping; expected names of parameters with values"),
+        "base_local_planner": (
+            "# $(arg i)\na: $(find quad)\n",
+            "2: unknown $(find quad); expected $(arg i)",
+        ),
+    }
+    for stem, (text, _) in broken.items():
+        (folder / f"{stem}_params.yaml").write_text(text)
+    told = sorted(problems(folder, {"i": "0"}))
+    for line, (stem, (_, fault)) in zip(told, sorted(broken.items())):
+        assert line.startswith(f"{folder}/{stem}_params.yaml:{fault}")
 
 
 def test_key_that_is_set_twice_has_its_last_value_and_a_remark(folder):
-    (folder / "local_costmap_params.yaml").write_text(
-        "local_costmap:\n  width: 3.0\n  height: 3.0\n  width: 5.0\n"
-    )
+    path = folder / "local_costmap_params.yaml"
+    path.write_text("local_costmap:\n  width: 3.0\n  height: 3.0\n  width: 5.0\n")
     tree = load_files(folder, {"i": "0"})
     assert tree["local_costmap"]["width"] == 5.0
     assert [str(remark) for remark in load(tree, "").remarks if "twice" in remark.text] == [
-        f"local_costmap/width ({folder / 'local_costmap_params.yaml'}:4): set twice; YAML uses"
-        " the last value"
+        f"local_costmap/width ({path}:4): set twice; YAML uses the last value"
     ]
 
 
@@ -154,19 +132,15 @@ def test_costmaps_own_files_may_leave_the_namespace_to_roslaunch(tmp_path):
     }
     for name, text in texts.items():
         (tmp_path / name).write_text(text)
-    tree = load_files([tmp_path / name for name in texts])
+    placed = PlacedFile(tmp_path / "planner.yaml", ("TrajectoryPlannerROS",))
+    tree = load_files([*(tmp_path / name for name in texts), placed])
     assert tree == {
         "local_costmap": {"width": 3.0, "height": 2.0},
         "global_costmap": {"width": 4.0, "height": 2.0},
         "width": 5.0,
+        "TrajectoryPlannerROS": {"width": 5.0},
     }
     assert tree.origins["local_costmap/width"] == f"{tmp_path / 'costmap_local.yaml'}:1"
-
-
-def test_a_file_may_be_placed(tmp_path):
-    (tmp_path / "house.yaml").write_text("width: 3.0\n")
-    placed = PlacedFile(tmp_path / "house.yaml", ("local_costmap",))
-    assert load_files([placed]) == {"local_costmap": {"width": 3.0}}
 
 
 def test_dump_of_a_parameter_server(tmp_path):

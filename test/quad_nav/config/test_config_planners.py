@@ -1,4 +1,4 @@
-"""Choice of planners: their parameters, and remarks on those that are not chosen."""
+"""Choice of planners and their parameters; ``test_config_remarks`` has the remarks on them."""
 
 from __future__ import annotations
 
@@ -11,45 +11,42 @@ from quad_nav.errors import InputError
 from quad_nav.plan.carrot import Carrot, CarrotParams
 from quad_nav.plan.global_planner import SearchPlanner, SearchPlannerParams
 from quad_nav.plan.navfn import Navfn, NavfnParams
+from quad_nav.recovery import TurnLimits
 from quad_nav.scenario.assembly import apply_configuration, build_navigator
 
-SEEING = {"observation_sources": "scan", "scan": {"data_type": "LaserScan"}}
 DWA = {"base_local_planner": "dwa_local_planner/DWAPlannerROS"}
 SEARCH = {"base_global_planner": "global_planner/GlobalPlanner"}
+LATCH = "latch_xy_goal_tolerance"
 
 
-def told(tree):
-    """(kind, line) of each remark; the costmaps have sources, so that none is on empty costmaps."""
-    tree = {"global_costmap": dict(SEEING), "local_costmap": dict(SEEING), **tree}
-    return [(remark.kind, str(remark)) for remark in load(tree, "/nav").remarks]
+def dwa(namespace, **node_level):
+    return load({**DWA, **node_level, "DWAPlannerROS": namespace}, "/nav")
+
+
+def problems(tree):
+    with pytest.raises(InputError) as caught:
+        load(tree)
+    return caught.value.problems
 
 
 @pytest.mark.parametrize(
     "name, namespace, planner, params",
     [
-        (
-            "navfn/NavfnROS",
-            {"NavfnROS": {"allow_unknown": False}},
-            Navfn,
-            NavfnParams(allow_unknown=False),
-        ),
+        ("navfn/NavfnROS", {"allow_unknown": False}, Navfn, NavfnParams(allow_unknown=False)),
         (
             "global_planner/GlobalPlanner",
-            {"GlobalPlanner": {"use_dijkstra": False, "cost_factor": 1, "orientation_mode": 2}},
+            {"use_dijkstra": False, "cost_factor": 1, "orientation_mode": 2},
             SearchPlanner,
             SearchPlannerParams(use_dijkstra=False, cost_factor=1.0, orientation_mode=2),
         ),
-        ("carrot_planner/CarrotPlanner", {}, Carrot, CarrotParams()),
-        ("CarrotPlanner", {}, Carrot, CarrotParams()),
+        ("CarrotPlanner", {}, Carrot, CarrotParams()),  # an old name
     ],
 )
 def test_chosen_planner_is_built_with_its_parameters(name, namespace, planner, params):
-    configuration = load({"base_global_planner": name, **namespace})
+    configuration = load({"base_global_planner": name, name.split("/")[-1]: namespace})
     navigator = build_navigator(configuration)
-
-    assert configuration.global_planner == params
+    assert configuration.global_planner == navigator.planner.params == params
     assert isinstance(navigator.planner, planner)
-    assert navigator.planner.params == params
 
 
 @pytest.mark.parametrize(
@@ -58,111 +55,62 @@ def test_chosen_planner_is_built_with_its_parameters(name, namespace, planner, p
 def test_every_planner_that_can_be_chosen_can_be_built(key, name):
     configuration = load({key: name})
     navigator = build_navigator(configuration)
-    made = {"base_global_planner": navigator.planner, "base_local_planner": navigator.controller}
-    chosen = {
-        "base_global_planner": configuration.global_planner,
-        "base_local_planner": configuration.local_planner,
-    }
-    assert made[key].params == chosen[key]
+    assert navigator.planner.params == configuration.global_planner
+    assert navigator.controller.params == configuration.local_planner
     apply_configuration(navigator, configuration)
 
 
 def test_carrot_has_the_footprint_in_force():
     configuration = load({"base_global_planner": "carrot_planner/CarrotPlanner"})
     navigator = build_navigator(configuration)
-    np.testing.assert_array_equal(navigator.planner.footprint, navigator.global_costmap.footprint)
-
     configuration = updated(configuration, "global_costmap", {"robot_radius": 0.2})
     apply_configuration(navigator, configuration)
-
     assert np.abs(navigator.planner.footprint).max() == pytest.approx(0.21)
 
 
+def test_an_empty_namespace_of_dwa_is_completed():
+    configuration = dwa({})
+    assert configuration.local_planner == DwaParams()
+    left = configuration.to_tree()["DWAPlannerROS"]
+    assert left["vy_samples"] == 10
+    assert "sum_scores" not in left  # read once, not on the parameter server
+
+
+def test_values_of_dwa_reach_their_fields():
+    params = dwa(
+        {"max_vel_trans": 1.5, "theta_stopped_vel": 0.3, "vth_samples": 7.0, "sum_scores": True}
+    ).local_planner
+    assert (params.max_vel_trans_mps, params.rot_stopped_velocity_radps) == (1.5, 0.3)
+    assert params.vth_samples == 7 and isinstance(params.vth_samples, int)
+    assert params.sum_scores
+
+
 @pytest.mark.parametrize(
-    "tree, kind, line",
-    [
-        (
-            {"GlobalPlanner": {"anything": 1}},
-            "unused",
-            "GlobalPlanner: unused: base_global_planner is navfn/NavfnROS; expected"
-            " base_global_planner=global_planner/GlobalPlanner to fly with it",
-        ),
-        (
-            {**SEARCH, "NavfnROS": {"allow_unknown": 3}},
-            "unused",
-            "NavfnROS: unused: base_global_planner is global_planner/GlobalPlanner; expected"
-            " base_global_planner=navfn/NavfnROS to fly with it",
-        ),
-        (
-            {**SEARCH, "GlobalPlanner": {"default_tolerance": 0.5}},
-            "ignored",
-            "GlobalPlanner/default_tolerance: ignored by move_base: read and never used",
-        ),
-        (
-            {**SEARCH, "GlobalPlanner": {"use_djikstra": True}},
-            "unknown",
-            "GlobalPlanner/use_djikstra: unknown parameter, nothing reads it; did you mean"
-            " use_dijkstra?",
-        ),
-        (
-            {"base_global_planner": "GlobalPlanner"},
-            "renamed",
-            "base_global_planner: GlobalPlanner is an old name of global_planner/GlobalPlanner",
-        ),
-        (
-            {"TebLocalPlannerROS": {}},
-            "unsupported",
-            "TebLocalPlannerROS: planner not supported; its parameters are not read",
-        ),
-    ],
-    ids=str,
+    "own, node_level, in_force",
+    [({}, {}, False), ({LATCH: True}, {}, True), ({}, {LATCH: True}, True)]
+    + [({LATCH: False}, {LATCH: True}, False)],
 )
-def test_only_remark(tree, kind, line):
-    assert told(tree) == [(kind, "/nav/" + line)]
+def test_latch_is_inherited(own, node_level, in_force):
+    assert dwa(own, **node_level).local_planner.latch_xy_goal_tolerance == in_force
 
 
-def test_dwa_flies_with_its_own_parameters_and_those_at_the_nodes_level():
-    tree = {
-        **DWA,
-        "latch_xy_goal_tolerance": True,
-        "controller_frequency": 5.0,
-        "DWAPlannerROS": {"max_vel_x": 0.3, "controller_frequency": 10.0},
-    }
-
-    configuration = load(tree, "/nav")
-
-    assert configuration.local_planner == DwaParams(
-        max_vel_x_mps=0.3, latch_xy_goal_tolerance=True, controller_frequency_hz=10.0
-    )
+def test_dwa_flies_at_its_own_rate():
+    configuration = dwa({"max_vel_x": 0.3, "controller_frequency": 10.0}, controller_frequency=5.0)
     assert configuration.local_planner_period_s == 0.1
-    assert [line for kind, line in told(tree)] == [
-        "/nav/DWAPlannerROS/controller_frequency: rollouts assume 10.0 Hz, but the control"
-        " loop runs at 5.0 Hz"
-    ]
     changed = updated(configuration, "DWAPlannerROS", {"max_vel_x": 0.2})
     assert changed.local_planner.max_vel_x_mps == 0.2
     assert list(reconfigurable(changed))[:2] == ["", "DWAPlannerROS"]
 
 
 def test_rotations_read_limits_of_the_trajectory_planner_when_it_is_not_chosen():
-    tree = {**DWA, "TrajectoryPlannerROS": {"max_vel_theta": 0.4, "max_vel_x": "not read"}}
-
-    configuration = load(tree, "/nav")
-
-    assert dict(configuration.recoveries)["rotate_recovery"].limits.max_vel_theta_radps == 0.4
-    assert told(tree) == [
-        (
-            "unused",
-            "/nav/TrajectoryPlannerROS: unused: base_local_planner is"
-            " dwa_local_planner/DWAPlannerROS; expected"
-            " base_local_planner=base_local_planner/TrajectoryPlannerROS to fly with it;"
-            " rotate_recovery still reads its limits",
-        )
-    ]
+    limits = {"max_vel_theta": 0.4, "max_vel_x": "not read"}
+    configuration = dwa({}, TrajectoryPlannerROS=limits)
+    rotation = dict(configuration.recoveries)["rotate_recovery"]
+    assert rotation.limits == TurnLimits(max_vel_theta_radps=0.4)
     assert "TrajectoryPlannerROS" not in reconfigurable(configuration)
-    tree["TrajectoryPlannerROS"]["max_vel_theta"] = "fast"
+    limits["max_vel_theta"] = "fast"
     with pytest.raises(InputError, match="TrajectoryPlannerROS/max_vel_theta: 'fast' is not a"):
-        load(tree)
+        dwa({}, TrajectoryPlannerROS=limits)
 
 
 def test_global_planner_is_reconfigurable():
@@ -177,28 +125,18 @@ def test_global_planner_is_reconfigurable():
         "orientation_window_size": 1,
         "outline_map": True,
     }
-
+    navigator = build_navigator(configuration)
     changed = updated(configuration, "GlobalPlanner", {"cost_factor": 9.0, "orientation_mode": 3})
-
-    assert changed.global_planner == SearchPlannerParams(
+    apply_configuration(navigator, changed)
+    assert changed.local_planner == configuration.local_planner
+    assert navigator.planner.params == SearchPlannerParams(
         neutral_cost=60, cost_factor=5.0, orientation_mode=3
     )
-    assert changed.local_planner == configuration.local_planner
-    navigator = build_navigator(configuration)
-    apply_configuration(navigator, changed)
-    assert navigator.planner.params.cost_factor == 5.0
-
-
-def test_local_planner_is_reconfigurable_beside_any_global_one():
-    changed = updated(load(SEARCH), "TrajectoryPlannerROS", {"max_vel_x": 0.2})
-    assert changed.local_planner.max_vel_x_mps == 0.2
-    assert changed.global_planner == SearchPlannerParams()
 
 
 def test_planners_without_reconfigurable_parameters():
-    for name in ("NavfnROS", "CarrotPlanner"):
-        with pytest.raises(InputError, match=f"^{name}: not reconfigurable"):
-            updated(load({"base_global_planner": name}), name, {})
+    with pytest.raises(InputError, match="^NavfnROS: not reconfigurable"):
+        updated(load({}), "NavfnROS", {})
 
 
 def test_planners_cannot_change_in_flight():
@@ -222,8 +160,8 @@ def test_planners_cannot_change_in_flight():
             " carrot_planner/CarrotPlanner",
         ),
         (
-            {"base_local_planner": "teb_local_planner/TebLocalPlannerROS"},
-            "base_local_planner: teb_local_planner/TebLocalPlannerROS is not supported; expected"
+            {"base_local_planner": "teb"},
+            "base_local_planner: teb is not supported; expected"
             " --set base_local_planner=dwa_local_planner/DWAPlannerROS or"
             " base_local_planner/TrajectoryPlannerROS",
         ),
@@ -233,18 +171,11 @@ def test_planners_cannot_change_in_flight():
             " --set base_local_planner=base_local_planner/TrajectoryPlannerROS or"
             " dwa_local_planner/DWAPlannerROS",
         ),
+        (
+            {"base_global_planner": None},
+            "base_global_planner: None is not a string; expected a plugin's name",
+        ),
     ],
 )
 def test_planner_that_is_not_supported_is_refused_with_one_that_has_parameters(tree, fault):
-    with pytest.raises(InputError) as caught:
-        load(tree)
-    assert caught.value.problems == [f"/{fault}"]
-
-
-def test_invalid_choice():
-    for value, expected in (
-        (3, "3 is not a string; expected a plugin's name"),
-        (None, "None is not a string; expected a plugin's name"),
-    ):
-        with pytest.raises(InputError, match=expected):
-            load({"base_global_planner": value})
+    assert problems(tree) == [f"/{fault}"]

@@ -37,46 +37,39 @@ def test_namespaces(configuration):
     ]
 
 
-def test_parameters_are_in_the_order_of_upstream(configuration):
-    names = {
-        namespace: [parameter.name for parameter in parameters if not parameter.is_own]
-        for namespace, parameters in reconfigurable(configuration).items()
-    }
-    assert names["local_costmap"] == [
-        "transform_tolerance",
-        "update_frequency",
-        "publish_frequency",
-        "width",
-        "height",
-        "resolution",
-        "origin_x",
-        "origin_y",
-        "footprint",
-        "robot_radius",
-        "footprint_padding",
-    ]
-    assert names["local_costmap/obstacle_layer"] == [
-        "enabled",
-        "footprint_clearing_enabled",
-        "max_obstacle_height",
-        "combination_method",
-    ]
-    assert names["local_costmap/inflation_layer"] == [
-        "enabled",
-        "cost_scaling_factor",
-        "inflation_radius",
-        "inflate_unknown",
-    ]
-    assert names["local_costmap/static_layer"] == ["enabled"]
-    assert names[""][:4] == [
-        "base_global_planner",
-        "base_local_planner",
-        "planner_frequency",
-        "controller_frequency",
-    ]
-    assert len(names[""]) == 16
-    assert len(names["TrajectoryPlannerROS"]) == 28
-    assert names["TrajectoryPlannerROS"][-2:] == ["y_vels", "restore_defaults"]
+def names_of(configuration, namespace):
+    """Names of upstream's parameters in their order."""
+    return [one.name for one in reconfigurable(configuration)[namespace] if not one.is_own]
+
+
+@pytest.mark.parametrize(
+    "namespace, names",
+    [
+        (
+            "local_costmap",
+            "transform_tolerance update_frequency publish_frequency width height resolution"
+            " origin_x origin_y footprint robot_radius footprint_padding",
+        ),
+        (
+            "local_costmap/obstacle_layer",
+            "enabled footprint_clearing_enabled max_obstacle_height combination_method",
+        ),
+        (
+            "local_costmap/inflation_layer",
+            "enabled cost_scaling_factor inflation_radius inflate_unknown",
+        ),
+        ("local_costmap/static_layer", "enabled"),
+    ],
+)
+def test_parameters_are_in_the_order_of_upstream(configuration, namespace, names):
+    assert names_of(configuration, namespace) == names.split()
+
+
+def test_the_node_and_the_planner_have_as_many_as_upstream(configuration):
+    node, planner = names_of(configuration, ""), names_of(configuration, "TrajectoryPlannerROS")
+    assert node[:3] == ["base_global_planner", "base_local_planner", "planner_frequency"]
+    assert (len(node), len(planner)) == (16, 28)
+    assert planner[-2:] == ["y_vels", "restore_defaults"]
 
 
 def test_types_are_those_of_the_messages(configuration):
@@ -109,21 +102,13 @@ def test_changes_of_costmaps_and_layers(configuration):
 
 def test_voxel_layer():
     configuration = load({"local_costmap": {"map_type": "voxel"}}, "")
-    names = [
-        parameter.name
-        for parameter in reconfigurable(configuration)["local_costmap/obstacle_layer"]
-    ]
-    assert names == [
-        "enabled",
-        "footprint_clearing_enabled",
-        "max_obstacle_height",
-        "origin_z",
-        "z_resolution",
-        "z_voxels",
-        "unknown_threshold",
-        "mark_threshold",
-        "combination_method",
-    ]
+    assert (
+        names_of(configuration, "local_costmap/obstacle_layer")
+        == (
+            "enabled footprint_clearing_enabled max_obstacle_height origin_z z_resolution z_voxels"
+            " unknown_threshold mark_threshold combination_method"
+        ).split()
+    )
     changed = updated(configuration, "local_costmap/obstacle_layer", {"z_voxels": 4})
     assert dict(changed.local_costmap.layers)["obstacle_layer"].z_voxels == 4
 
@@ -162,40 +147,28 @@ def test_restore_defaults_goes_back_to_what_was_loaded(configuration):
 
 
 def test_all_refused_changes_are_reported_and_none_is_made(configuration):
+    changes = {
+        "planner_frequency": 2.0,
+        "controller_frequency": 0.0,
+        "planner_patience": float("nan"),
+        "shutdown_costmaps": 1,
+        "speed": 1.0,
+    }
     with pytest.raises(InputError) as caught:
-        updated(
-            configuration,
-            "",
-            {
-                "planner_frequency": 2.0,
-                "controller_frequency": 0.0,
-                "planner_patience": float("nan"),
-                "shutdown_costmaps": 1,
-                "base_local_planner": "dwa_local_planner/DWAPlannerROS",
-            },
-        )
-    assert caught.value.problems == [
+        updated(configuration, "", changes)
+    told = caught.value.problems
+    assert told.pop().startswith("speed: unknown parameter; expected one of base_global_planner,")
+    assert told == [
         "controller_frequency: 0.0 is out of range; expected a positive number of Hz",
         "planner_patience: nan is not finite; expected a number of seconds, 0 or more",
         "shutdown_costmaps: 1 is not a boolean; expected true or false",
-        "base_local_planner: planners cannot change in flight, got"
-        " 'dwa_local_planner/DWAPlannerROS'; expected base_local_planner/TrajectoryPlannerROS",
     ]
     assert configuration.navigator.planner_frequency_hz == 0.0
 
 
 def test_size_out_of_range_is_refused(configuration):
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(InputError, match="^global_costmap: 21474836 x 10 m .* take 3264.2 GB of"):
         updated(configuration, "global_costmap", {"width": 21474836})
-    assert caught.value.problems == [
-        "global_costmap: 21474836 x 10 m with cells of 0.05 m is not supported: 429496720 x"
-        " 200 cells of 38 bytes each take 3264.2 GB of memory; expected 1 GB at most (a smaller"
-        " width and height, a larger resolution, or fewer layers)"
-    ]
-    with pytest.raises(
-        InputError, match="^local_costmap: 10 x 10 m with cells of 20 m is not supported;"
-    ):
-        updated(configuration, "local_costmap", {"resolution": 20.0})
 
 
 def test_too_many_trajectories_are_refused(configuration):
@@ -225,15 +198,6 @@ def test_dwa_planner_is_refused_the_same(change, told):
         updated(dwa, "DWAPlannerROS", change)
     changed = updated(dwa, "DWAPlannerROS", {"vx_samples": 300, "max_vel_y": 1e9})
     assert changed.local_planner.vx_samples == 300
-
-
-def test_names_and_namespaces_that_do_not_exist(configuration):
-    with pytest.raises(
-        InputError, match="^TrajectoryPlannerROS/speed: unknown parameter; expected one of"
-    ):
-        updated(configuration, "TrajectoryPlannerROS", {"speed": 1.0})
-    with pytest.raises(InputError, match="^NavfnROS: not reconfigurable; expected one of"):
-        updated(configuration, "NavfnROS", {})
 
 
 def test_groups_of_dynamic_reconfigure_are_ignored(configuration):

@@ -10,7 +10,7 @@ import yaml
 from quad_nav.config import load, load_files
 from quad_nav.config.configuration import MOVE_BASE_TABLE
 from quad_nav.config.fixes import GROUPS
-from quad_nav.config.local_planners import TRAJECTORY_PLANNER, TRAJECTORY_PLANNER_TABLE
+from quad_nav.config.planners import LOCAL_PLANNERS, TRAJECTORY_PLANNER
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
@@ -19,68 +19,33 @@ from quad_nav.recovery import ClearCostmapParams, RotateParams, TurnLimits
 CONFIG = Path(__file__).resolve().parents[3] / "config"
 RECORDED = Path(__file__).parent / "data" / "tutorial_parameters.yaml"
 
+# The tutorial's files, without comments.
 WRITTEN = {
-    "base_local_planner_params": {
-        "TrajectoryPlannerROS": {
-            "max_vel_x": 0.3,
-            "min_vel_x": 0.1,
-            "max_vel_theta": 0.7,
-            "min_in_place_vel_theta": 1.0,
-            "acc_lim_theta": 3.2,
-            "acc_lim_x": 2.0,
-            "acc_lim_y": 2.0,
-            "holonomic_robot": False,
-            "meter_scoring": True,
-        }
-    },
-    "costmap_common_params": {
-        "obstacle_range": 2.5,
-        "raytrace_range": 3.0,
-        "inflation_radius": 0.40,
-        "robot_radius": 0.35,
-        "transform_tolerance": 0.8,
-        "observation_sources": "base_scan",
-        "base_scan": {
-            "sensor_frame": "Lidar$(arg i)",
-            "data_type": "LaserScan",
-            "topic": "scan$(arg i)",
-            "expected_update_rate": 21.0,
-            "observation_persistence": 1.0,
-            "marking": True,
-            "clearing": True,
-            "min_obstacle_height": -0.10,
-            "max_obstacle_height": 2.0,
-            "obstacle_range": 2.0,
-            "inf_is_valid": True,
-            "raytrace_range": 6.0,
-        },
-    },
-    "global_costmap_params": {
-        "global_costmap": {
-            "global_frame": "map",
-            "robot_base_frame": "base_link$(arg i)",
-            "update_frequency": 3.0,
-            "static_map": False,
-            "width": 12.0,
-            "height": 12.0,
-        }
-    },
-    "local_costmap_params": {
-        "local_costmap": {
-            "global_frame": "map",
-            "robot_base_frame": "base_link$(arg i)",
-            "update_frequency": 4.0,
-            "publish_frequency": 2.0,
-            "static_map": False,
-            "rolling_window": True,
-            "width": 3.0,
-            "height": 3.0,
-            "resolution": 0.025,
-            "origin_x": 0.0,
-            "origin_y": 0.0,
-        }
-    },
-    "move_base_params": {"conservative_reset_dist": 1.0, "controller_frequency": 1.0},
+    "base_local_planner_params": """
+TrajectoryPlannerROS:
+  {max_vel_x: 0.3, min_vel_x: 0.1, max_vel_theta: 0.7, min_in_place_vel_theta: 1.0,
+   acc_lim_theta: 3.2, acc_lim_x: 2.0, acc_lim_y: 2.0, holonomic_robot: false, meter_scoring: true}
+""",
+    "costmap_common_params": """
+{obstacle_range: 2.5, raytrace_range: 3.0, inflation_radius: 0.40, robot_radius: 0.35,
+ transform_tolerance: 0.8, observation_sources: base_scan, base_scan:
+  {sensor_frame: Lidar$(arg i), data_type: LaserScan, topic: scan$(arg i),
+   expected_update_rate: 21.0, observation_persistence: 1.0, marking: true, clearing: true,
+   min_obstacle_height: -0.10, max_obstacle_height: 2.0, obstacle_range: 2.0, inf_is_valid: true,
+   raytrace_range: 6.0}}
+""",
+    "global_costmap_params": """
+global_costmap:
+  {global_frame: map, robot_base_frame: base_link$(arg i), update_frequency: 3.0,
+   static_map: false, width: 12.0, height: 12.0}
+""",
+    "local_costmap_params": """
+local_costmap:
+  {global_frame: map, robot_base_frame: base_link$(arg i), update_frequency: 4.0,
+   publish_frequency: 2.0, static_map: false, rolling_window: true, width: 3.0, height: 3.0,
+   resolution: 0.025, origin_x: 0.0, origin_y: 0.0}
+""",
+    "move_base_params": "{conservative_reset_dist: 1.0, controller_frequency: 1.0}",
 }
 
 
@@ -91,7 +56,7 @@ def tutorial(number: str = "0"):
 @pytest.mark.parametrize("stem", sorted(WRITTEN))
 def test_file_holds_the_tutorials_values_and_nothing_else(stem):
     text = (CONFIG / "tutorial" / f"{stem}.yaml").read_text()
-    assert yaml.safe_load(text) == WRITTEN[stem]
+    assert yaml.safe_load(text) == yaml.safe_load(WRITTEN[stem])
 
 
 def test_there_are_no_other_files():
@@ -101,9 +66,10 @@ def test_there_are_no_other_files():
 def test_tree_is_what_move_base_leaves_on_the_parameter_server():
     left = load(tutorial(), "/move_base0").to_tree()
     recorded = yaml.safe_load(RECORDED.read_text())
+    planner = LOCAL_PLANNERS["base_local_planner/TrajectoryPlannerROS"]
     for group in GROUPS:
         del left[group]  # not in the original
-    for namespace, table in (("", MOVE_BASE_TABLE), (TRAJECTORY_PLANNER, TRAJECTORY_PLANNER_TABLE)):
+    for namespace, table in (("", MOVE_BASE_TABLE), (TRAJECTORY_PLANNER, planner)):
         for own in (one for one in table.reconfigurable if one.is_own):
             del (left[namespace] if namespace else left)[own.name]
     assert left == recorded
@@ -136,9 +102,9 @@ def test_only_remark_is_on_the_long_update_period():
 def test_costmaps():
     configuration = load(tutorial("1"), "/move_base1")
     source = SourceParams(
-        name="base_scan",
-        topic="scan1",
-        sensor_frame="Lidar1",
+        "base_scan",
+        "scan1",
+        "Lidar1",
         data_type="LaserScan",
         observation_persistence_s=1.0,
         expected_update_period_s=21.0,

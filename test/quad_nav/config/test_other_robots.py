@@ -14,6 +14,8 @@ from quad_nav.errors import InputError
 from quad_nav.scenario import robot_parameters
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 
+DWA = "dwa_local_planner/DWAPlannerROS"
+TRAJECTORY = "base_local_planner/TrajectoryPlannerROS"
 ROBOT = """\
 footprint: [[-0.2, -0.3], [-0.2, 0.3], [0.5, 0.3], [0.5, -0.3]]
 global_costmap:
@@ -64,38 +66,22 @@ def test_frames_topics_and_sensors_of_a_quadcopter(robot):
 
 
 def test_one_line_for_each_kind_of_change(robot):
-    remarks = [(remark.place, remark.kind, remark.text) for remark in fitted(robot, 3).remarks]
-    assert remarks == [
-        (
-            "frames",
-            "caution",
-            "/map: tf2 refuses the leading slash, move_base in C++ does not run with it",
-        ),
-        (
-            "frames",
-            "mapped",
-            "base_footprint is base_link{i}, robot/odom_combined is odom{i},"
-            " front_laser is Lidar{i}",
-        ),
-        ("topics", "mapped", "front/scan is /scan{i}"),
-        (
-            "sensors",
-            "left out",
-            "bump (PointCloud2), camera (PointCloud): left out, a quadcopter has none",
-        ),
-        ("sensors", "left out", "rear: left out, the one LIDAR sees all around"),
-        (
-            "heights",
-            "mapped",
-            "min_obstacle_height, max_obstacle_height: raised to the LIDAR of a flying robot",
-        ),
-        (
-            "body_radius",
-            "mapped",
-            "the simulated body is a disc of 0.2 m radius, which fits into the robot's footprint;"
-            " set body_radius for another",
-        ),
+    assert [f"{one.place}: {one.kind}: {one.text}" for one in fitted(robot, 3).remarks] == [
+        "frames: caution: /map: tf2 refuses the leading slash, move_base in C++ does not run with"
+        " it",
+        "frames: mapped: base_footprint is base_link{i}, robot/odom_combined is odom{i},"
+        " front_laser is Lidar{i}",
+        "topics: mapped: front/scan is /scan{i}",
+        "sensors: left out: bump (PointCloud2), camera (PointCloud): left out, a quadcopter has"
+        " none",
+        "sensors: left out: rear: left out, the one LIDAR sees all around",
+        "heights: mapped: min_obstacle_height, max_obstacle_height: raised to the LIDAR of a"
+        " flying robot",
+        "body_radius: mapped: the simulated body is a disc of 0.2 m radius, which fits into the"
+        " robot's footprint; set body_radius for another",
     ]
+    assert fitted(robot, 0).remarks == fitted(robot, 12).remarks
+    assert not [one for one in load(fitted(robot, 0)).remarks if "looks like a source" in one.text]
 
 
 def test_a_navigator_under_ros_logs_the_same_lines(tmp_path, capsys):
@@ -109,10 +95,6 @@ def test_a_navigator_under_ros_logs_the_same_lines(tmp_path, capsys):
         : len(offline) - 1
     ]
     assert load(on_the_server).body_radius_m == 0.2
-
-
-def test_all_robots_have_the_same_lines(robot):
-    assert lines(fitted(robot, 0)) == lines(fitted(robot, 12))
 
 
 def test_a_configuration_of_quadcopters_stays_as_it_is():
@@ -197,24 +179,28 @@ def test_the_body_fits_into_the_footprint(tmp_path, text, radius_m):
     assert load(fitted(tree_of(tmp_path, text), 0)).body_radius_m == pytest.approx(radius_m)
 
 
-def test_the_only_planner_with_parameters_is_flown(tmp_path):
-    tree = fitted(tree_of(tmp_path, "DWAPlannerROS: {max_vel_x: 0.4}"), 0)
-    assert tree["base_local_planner"] == "dwa_local_planner/DWAPlannerROS"
-    assert lines(tree)["base_local_planner"] == (
-        "mapped: dwa_local_planner/DWAPlannerROS, the only one with parameters"
-    )
-    both = "{DWAPlannerROS: {max_vel_x: 0.4}, TrajectoryPlannerROS: {max_vel_x: 0.4}}"
-    tree = fitted(tree_of(tmp_path, both), 0)
-    assert tree["base_local_planner"] == "dwa_local_planner/DWAPlannerROS"
-    assert lines(tree)["base_local_planner"].endswith(
-        "; set base_local_planner=base_local_planner/TrajectoryPlannerROS for the other"
-    )
-    chosen = both[:-1] + ", base_local_planner: base_local_planner/TrajectoryPlannerROS}"
-    assert fitted(tree_of(tmp_path, chosen), 0)["base_local_planner"].endswith(
-        "TrajectoryPlannerROS"
-    )
-    with_teb = both.replace("DWAPlannerROS", "TebLocalPlannerROS")
-    assert "base_local_planner" not in fitted(tree_of(tmp_path, with_teb), 0)
+@pytest.mark.parametrize(
+    "planners, chosen, told",
+    [
+        (["DWAPlannerROS"], DWA, f"mapped: {DWA}, the only one with parameters"),
+        (
+            ["DWAPlannerROS", TRAJECTORY.split("/")[1]],
+            DWA,
+            f"; set base_local_planner={TRAJECTORY} for the other",
+        ),
+        (["TebLocalPlannerROS", TRAJECTORY.split("/")[1]], None, ""),
+    ],
+)
+def test_the_planner_with_parameters_is_flown(tmp_path, planners, chosen, told):
+    text = "".join(f"{name}: {{max_vel_x: 0.4}}\n" for name in planners)
+    tree = fitted(tree_of(tmp_path, text), 0)
+    assert tree.get("base_local_planner") == chosen
+    assert lines(tree).get("base_local_planner", "").endswith(told)
+    named = tree_of(tmp_path, f"{text}base_local_planner: {TRAJECTORY}")
+    assert fitted(named, 0)["base_local_planner"] == TRAJECTORY
+
+
+def test_parameters_of_a_planner_that_is_not_here_are_refused(tmp_path):
     teb = fitted(tree_of(tmp_path, "TebLocalPlannerROS: {max_vel_x: 0.4}"), 0)
     with pytest.raises(InputError, match="TebLocalPlannerROS is not supported; expected --set"):
         load(teb)
@@ -237,8 +223,3 @@ def test_a_body_too_large_for_a_goal_is_refused(tmp_path):
     (tmp_path / "quad0_goals.json").write_text('{"goals": [[1.0, 6.0]]}')
     with pytest.raises(InputError, match="1.00 m from"):
         read_setup(FlightOptions(None, tmp_path, str(tmp_path / "robot.yaml"), robots=1))
-
-
-def test_what_is_left_out_is_told_once(robot):
-    remarks = load(fitted(robot, 0)).remarks
-    assert not [one for one in remarks if "looks like a source" in one.text]

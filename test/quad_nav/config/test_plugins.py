@@ -104,7 +104,8 @@ def test_examples_load_with_remarks_on_empty_costmaps_only(tree):
     assert again.recoveries == configuration.recoveries
 
 
-def test_examples_fly_to_the_goal(tree):
+def test_examples_fly_to_the_goal_with_limited_accelerations(tree):
+    """At 10 Hz, 0.4 m/s^2 is 0.04 m/s from one command to the next; a stop is not limited."""
     navigator = build_navigator(config.load(tree))
 
     ticks, pose = fly(navigator, HERE, GOAL, 30.0)
@@ -113,14 +114,6 @@ def test_examples_fly_to_the_goal(tree):
     assert pose.distance_to(GOAL) <= 0.2
     plans = [tick.plan for tick in ticks if tick.plan is not None]
     np.testing.assert_allclose(plans[0][[0, -1]], [[1.0, 2.0, 1.0], [3.0, 5.0, 1.0]])
-
-
-def test_the_example_filter_limits_accelerations_and_no_stop(tree):
-    """At 10 Hz, 0.4 m/s^2 is 0.04 m/s from one command to the next."""
-    navigator = build_navigator(config.load(tree))
-
-    ticks, _ = fly(navigator, HERE, GOAL, 30.0)
-
     commands = [tick.command.vx_mps for tick in ticks if tick.command]
     assert commands[:4] == pytest.approx([0.04, 0.08, 0.12, 0.16])
     assert np.diff(commands[:-1]).max() <= 0.04 + 1e-9 and max(commands) == pytest.approx(0.4)
@@ -165,9 +158,6 @@ def test_example_layer_is_in_the_costmap_and_inflated(tree):
     assert costs[centre[1], centre[0]] == LETHAL
     assert costs[beside[1], beside[0]] == INSCRIBED
     assert (costs == LETHAL).sum() == pytest.approx(np.pi * 0.5**2 / 0.1**2, rel=0.1)
-
-
-def test_example_layer_can_be_switched_off(tree):
     tree["global_costmap"]["pond"] = {**tree["global_costmap"]["pond"], "enabled": False}
     navigator = build_navigator(config.load(tree))
     navigator.tick(0.0, RobotPoses(HERE, HERE), Twist2D())
@@ -209,15 +199,10 @@ def test_planner_is_kept_until_the_footprint_changes(tree):
 
 
 def test_nothing_of_a_plugin_is_reconfigurable(tree):
-    namespaces = config.reconfigurable(config.load(tree))
-    assert list(namespaces) == [
-        "",
-        "global_costmap",
-        "global_costmap/inflation_layer",
-        "local_costmap",
-        "local_costmap/inflation_layer",
-        *GROUPS,
-    ]
+    namespaces = set(config.reconfigurable(config.load(tree)))
+    costmaps = ("global_costmap", "local_costmap")
+    inflation = {f"{name}/inflation_layer" for name in costmaps}
+    assert namespaces == {"", *costmaps, *inflation, *GROUPS}
 
 
 def test_error_on_a_missing_parameter_names_its_place(tree):
@@ -238,40 +223,32 @@ def test_enabled_of_a_layer_has_to_be_a_boolean(tree):
     ]
 
 
+def test_namespace_of_a_plugin():
+    names = ("navfn/NavfnROS", "costmap_2d::NavfnROS", "my_package.planners.NavfnROS", "NavfnROS")
+    assert {plugin_name(name) for name in names} == {"NavfnROS"}
+
+
 @pytest.mark.parametrize(
-    "name, expected",
+    "name, complaint",
     [
-        ("navfn/NavfnROS", "NavfnROS"),
-        ("costmap_2d::ObstacleLayer", "ObstacleLayer"),
-        ("my_package.planners.StraightLine", "StraightLine"),
-        ("NavfnROS", "NavfnROS"),
+        (
+            "no_such_package.planners.Mine",
+            r"no module no_such_package; expected package\.module\.Class with the package's folder"
+            " in PYTHONPATH",
+        ),
+        ("my_package.nowhere.Mine", r"no module my_package\.nowhere; .*"),
+        (
+            "my_package.planners.Mine",
+            r"my_package\.planners \(.*planners\.py\) has no class Mine; expected a global planner"
+            r" as package\.module\.Class",
+        ),
+        ("my_package.planners.limit", ".* has limit, not a class; .*"),
     ],
 )
-def test_namespace_of_a_plugin(name, expected):
-    assert plugin_name(name) == expected
-
-
-def test_missing_module_or_class(package):
+def test_missing_module_or_class(package, name, complaint):
     package("planners.py", "limit = 3\n")
-    assert problems(
-        {
-            "base_global_planner": "no_such_package.planners.Mine",
-            "base_local_planner": "my_package.nowhere.Mine",
-        }
-    ) == [
-        "/nav/base_local_planner: no module my_package.nowhere; expected package.module.Class"
-        " with the package's folder in PYTHONPATH",
-        "/nav/base_global_planner: no module no_such_package; expected package.module.Class"
-        " with the package's folder in PYTHONPATH",
-    ]
-    [line] = problems({"base_global_planner": "my_package.planners.Mine"})
-    assert re.fullmatch(
-        r"/nav/base_global_planner: my_package\.planners \(.*planners\.py\) has no"
-        r" class Mine; expected a global planner as package\.module\.Class",
-        line,
-    )
-    [line] = problems({"base_global_planner": "my_package.planners.limit"})
-    assert "has limit, not a class" in line
+    [line] = problems({"base_global_planner": name})
+    assert re.fullmatch(f"/nav/base_global_planner: {complaint}", line)
 
 
 @pytest.mark.parametrize(
@@ -289,125 +266,119 @@ def test_module_that_cannot_be_imported(package, source, complaint):
     assert re.search(complaint, line)
 
 
-def test_planner_that_lacks_something(package):
-    package(
-        "planners.py",
-        """
-        class Mine:
-            def __init__(self, params):
-                pass
+MISFITS = """
+class Plan:
+    def __init__(self, params):
+        pass
 
-            def make_plan(self, spec, costs):
-                return None
-
-        class Follower:
-            def __init__(self, params, footprint, control_period_s):
-                pass
-
-            def set_plan(self, plan):
-                pass
-
-            def compute_velocity(self, spec, costs, pose, velocity):
-                pass
-    """,
-    )
-    mine = "/nav/base_global_planner: my_package.planners.Mine is not a global planner: "
-    assert problems({"base_global_planner": "my_package.planners.Mine"}) == [
-        mine + "__init__(self, params) cannot take its arguments; expected"
-        " __init__(self, params, footprint)",
-        mine + "make_plan(self, spec, costs) cannot take its arguments; expected"
-        " make_plan(self, spec, costs, start, goal)",
-    ]
-    follower = "/nav/base_local_planner: my_package.planners.Follower is not a local planner: "
-    assert problems({"base_local_planner": "my_package.planners.Follower"}) == [
-        follower + "it has no method set_footprint; expected set_footprint(self, footprint)",
-        follower + "compute_velocity(self, spec, costs, pose, velocity) cannot take its arguments;"
-        " expected compute_velocity(self, spec, costs, pose, velocity,"
-        " local_from_plan)",
-        follower + "it has no method is_goal_reached; expected is_goal_reached(self)",
-        follower + "it has no method cost_cloud; expected cost_cloud(self)",
-    ]
+    def make_plan(self, spec, costs):
+        return None
 
 
-def test_method_inherited_from_the_interface_does_not_count(package):
-    package(
-        "planners.py",
-        """
-        from quad_nav.plan.planner import GlobalPlanner
-
-        class Mine(GlobalPlanner):
-            def __init__(self, params, footprint):
-                pass
-    """,
-    )
-    [line] = problems({"base_global_planner": "my_package.planners.Mine"})
-    assert line.endswith(
-        "it has no method make_plan; expected make_plan(self, spec, costs, start, goal)"
-    )
+class Inherits(GlobalPlanner):  # a method of the interface does not count
+    def __init__(self, params, footprint):
+        pass
 
 
-def test_any_signature_that_can_take_the_arguments_will_do(package):
-    package(
-        "planners.py",
-        """
-        class Mine:
-            def __init__(self, *arguments, **options):
-                pass
+class Control:
+    def __init__(self, params, footprint, control_period_s):
+        pass
 
-            @staticmethod
-            def make_plan(spec, costs, start, goal, hurry=False):
-                return None
-    """,
-    )
-    assert config.load({"base_global_planner": "my_package.planners.Mine"})
+    def set_plan(self, plan):
+        pass
+
+    def compute_velocity(self, spec, costs, pose, velocity):
+        pass
 
 
-def test_layer_that_lacks_something(package):
-    package(
-        "layers.py",
-        """
-        from quad_nav.costmap.layer import Layer
-
-        class Plain:
-            pass
-
-        class Mine(Layer):
-            def update_bounds(self, robot, bounds):
-                return bounds
-    """,
-    )
-    costmap = {
-        "plugins": [
-            {"name": "plain", "type": "my_package.layers.Plain"},
-            {"name": "mine", "type": "my_package.layers.Mine"},
-        ]
-    }
-    mine = "/nav/local_costmap/plugins/mine: my_package.layers.Mine is not a costmap layer: "
-    assert problems({"local_costmap": costmap}) == [
-        "/nav/local_costmap/plugins/plain: my_package.layers.Plain is not a costmap layer: it is"
-        " not derived from Layer; expected class Plain(quad_nav.costmap.layer.Layer)",
-        mine + "__init__(self, params) cannot take its arguments; expected __init__(self, params,"
-        " spec, rolling_window, default_cost)",
-        mine + "update_bounds(self, robot, bounds) cannot take its arguments; expected"
-        " update_bounds(self, robot, now_s, bounds)",
-    ]
+class Plain:
+    pass
 
 
-def test_recovery_that_lacks_something(package):
-    package(
-        "recoveries.py",
-        """
-        class Mine:
-            def __init__(self, params):
-                self.period_s = 0.1
+class Mine(Layer):
+    def update_bounds(self, robot, bounds):
+        return bounds
 
-            def step(self, context):
-                pass
-    """,
-    )
-    behaviours = [{"name": "mine", "type": "my_package.recoveries.Mine"}]
-    mine = "/nav/recovery_behaviors/mine: my_package.recoveries.Mine is not a recovery behaviour: "
-    assert problems({"recovery_behaviors": behaviours}) == [
-        mine + "it has no period_s; expected a class attribute or a property of that name",
-        mine + "it has no method start; expected start(self, context)",
-    ]
+
+class Recover:
+    def __init__(self, params):
+        self.period_s = 0.1
+
+    def step(self, context):
+        pass
+
+
+class Anything:
+    def __init__(self, *arguments, **options):
+        pass
+
+    @staticmethod
+    def make_plan(spec, costs, start, goal, hurry=False):
+        return None
+"""
+PLAN = "make_plan(self, spec, costs, start, goal)"
+CONTROL = "compute_velocity(self, spec, costs, pose, velocity"
+
+
+@pytest.mark.parametrize(
+    "kind, tree, lacks",
+    [
+        (
+            "a global planner",
+            {"base_global_planner": "my_package.misfits.Plan"},
+            [
+                "__init__(self, params) cannot take its arguments; expected"
+                " __init__(self, params, footprint)",
+                f"make_plan(self, spec, costs) cannot take its arguments; expected {PLAN}",
+            ],
+        ),
+        (
+            "a global planner",
+            {"base_global_planner": "my_package.misfits.Inherits"},
+            [f"it has no method make_plan; expected {PLAN}"],
+        ),
+        (
+            "a local planner",
+            {"base_local_planner": "my_package.misfits.Control"},
+            [
+                "it has no method set_footprint; expected set_footprint(self, footprint)",
+                f"{CONTROL}) cannot take its arguments; expected {CONTROL}, local_from_plan)",
+                "it has no method is_goal_reached; expected is_goal_reached(self)",
+                "it has no method cost_cloud; expected cost_cloud(self)",
+            ],
+        ),
+        (
+            "a costmap layer",
+            {"local_costmap": {"plugins": [{"name": "x", "type": "my_package.misfits.Plain"}]}},
+            ["it is not derived from Layer; expected class Plain(quad_nav.costmap.layer.Layer)"],
+        ),
+        (
+            "a costmap layer",
+            {"local_costmap": {"plugins": [{"name": "x", "type": "my_package.misfits.Mine"}]}},
+            [
+                "__init__(self, params) cannot take its arguments; expected __init__(self, params,"
+                " spec, rolling_window, default_cost)",
+                "update_bounds(self, robot, bounds) cannot take its arguments; expected"
+                " update_bounds(self, robot, now_s, bounds)",
+            ],
+        ),
+        (
+            "a recovery behaviour",
+            {"recovery_behaviors": [{"name": "x", "type": "my_package.misfits.Recover"}]},
+            [
+                "it has no period_s; expected a class attribute or a property of that name",
+                "it has no method start; expected start(self, context)",
+            ],
+        ),
+    ],
+    ids=["plan", "inherited", "control", "plain", "layer", "recovery"],
+)
+def test_a_class_that_lacks_something(package, kind, tree, lacks):
+    imports = "from quad_nav.costmap.layer import Layer\n"
+    imports += "from quad_nav.plan.planner import GlobalPlanner\n"
+    package("misfits.py", imports + MISFITS)
+    told = problems(tree)
+    assert [line.partition(f" is not {kind}: ")[2] for line in told] == lacks
+    assert all(re.match(r"/nav/\S+: my_package\.misfits\.\w+ is not ", line) for line in told)
+    # Any signature that can take the arguments will do.
+    assert config.load({"base_global_planner": "my_package.misfits.Anything"})

@@ -26,7 +26,7 @@ from quad_nav.ros.common.packed_messages import (  # noqa: E402
 from quad_nav.ros.common.transforms import Transforms  # noqa: E402
 from quad_nav.ros.navigator.intention_topics import (  # noqa: E402
     INTENTIONS_TOPIC,
-    FleetIntentionPublisher,
+    host_publisher,
     intentions_from_message,
     intentions_message,
 )
@@ -310,24 +310,21 @@ def test_intentions_come_from_hosts_or_from_the_robots_own_topics(ros, wall):
 
 
 def test_intentions_of_a_host_are_published_together_when_one_changes(ros):
-    publisher = FleetIntentionPublisher([2, 3], "map", 0)
+    publisher = host_publisher("map", 0)
     topic = FakePublisher.all[INTENTIONS_TOPIC]
-    publisher.set(2, NO_PATH)
-    publisher.set(3, PATH)
-    times = []
+    intentions, times = {2: NO_PATH, 3: PATH}, []
     for step in range(12):
         if step == 7:
-            publisher.set(2, Intention(NO_PATH.priority, PATH.path))
+            intentions[2] = Intention(NO_PATH.priority, PATH.path)
         topic.last = None
-        publisher.publish(1.0 + 0.1 * step)
+        publisher.publish(intentions, 1.0 + 0.1 * step)
         if topic.last is not None:
             times.append(step)
             assert list(intentions_from_message(topic.last, range(5))) == [2, 3]
     assert times == [0, 3, 6, 7, 10]
-    alone = FleetIntentionPublisher([2], "map", 1)
-    alone.set(2, PATH)
+    alone = host_publisher("map", 1)
     topic = FakePublisher.all[INTENTIONS_TOPIC]
-    alone.publish(9.0)
+    alone.publish({2: PATH}, 9.0)
     assert topic.last is None
 
 

@@ -54,7 +54,7 @@ def test_it_waits_for_its_first_pose(ros, robot):
     odom_from_base = transform("odom0", "base_link0", 1.4)
     deliver("/tf", TFMessage([map_from_odom, odom_from_base]))
     step(ros, robot, 1.45)
-    window = robot._navigator.local_costmap.spec  # 3 m wide, around (4, 4)
+    window = robot.navigator.local_costmap.spec  # 3 m wide, around (4, 4)
     assert (window.origin_x_m, window.origin_y_m) == pytest.approx((2.5, 2.5))
     assert ros.log.lines == []
 
@@ -80,7 +80,7 @@ def test_it_stops_without_odometry_that_has_never_come_or_not_since_a_clock_jump
         pair = [transform("map", "odom0", now_s), transform("odom0", "base_link0", now_s)]
         deliver("/tf", TFMessage(pair))
         robot.step(now_s)
-        return robot._located_now()[1]
+        return robot._located_now()
 
     assert located(1.0).in_global is not None
     assert located(1.5).in_global is not None

@@ -15,10 +15,10 @@ from quad_nav.costmap.layered import CostmapParams, LayeredCostmap  # noqa: E402
 from quad_nav.costmap.observation import SourceParams  # noqa: E402
 from quad_nav.costmap.obstacle import ObstacleLayerParams  # noqa: E402
 from quad_nav.costmap.scan_filter import ScanFilters  # noqa: E402
-from quad_nav.costmap.scan_intake import sinks_of  # noqa: E402
+from quad_nav.costmap.scan_intake import ScanIntake, sinks_of  # noqa: E402
 from quad_nav.costmap.scan_validator import ScanValidator, ScanValidatorParams  # noqa: E402
 from quad_nav.ros.navigator import loop  # noqa: E402
-from quad_nav.ros.navigator.loop import NavigatorLoop, StallDetector  # noqa: E402
+from quad_nav.ros.navigator.loop import NavigatorLoop  # noqa: E402
 from quad_nav.ros.navigator.sensors import Sensor  # noqa: E402
 
 
@@ -35,36 +35,16 @@ def wall(monkeypatch):
     return wall
 
 
-def test_a_clock_that_stops_in_flight(wall):
-    stall = StallDetector(1.0)
-    stall.ended_after_s(1.05)
-    wall.now_s += 0.1
-    assert stall.ended_after_s(1.1) == pytest.approx(0.1)
-    wall.now_s += 2.0
-    assert stall.ended_after_s(1.1) == 0.0
-    wall.now_s += 1.0
-    assert stall.ended_after_s(1.15) == pytest.approx(3.0)
-
-
-def test_the_wait_for_the_first_step_is_no_stop(wall):
-    stall = StallDetector(1.0)
-    wall.now_s += 30.0
-    assert stall.ended_after_s(1.0) == 0.0
-    assert stall.ended_after_s(1.05) == 0.0
-
-
 def sensor_with(**params):
     source = SourceParams("laser", data_type="LaserScan", expected_update_period_s=0.5)
     layer = ObstacleLayerParams(sources=(source,))
     costmap = LayeredCostmap(CostmapParams(layers=(("obstacle_layer", layer),)))
-    return Sensor(
-        "quad0",
-        "/scan0",
-        "LaserScan",
-        sinks_of([costmap]),
-        ScanFilters([ScanValidator(ScanValidatorParams(**params))]),
-        "map",
+    filters = ScanFilters([ScanValidator(ScanValidatorParams(**params))])
+    host = SimpleNamespace(
+        configuration=SimpleNamespace(robot=0),
+        new_intake=lambda sinks: ScanIntake(sinks, filters, "map"),
     )
+    return Sensor(host, "/scan0", "LaserScan", sinks_of([costmap]))
 
 
 def scan_stamped(stamp_s):
@@ -96,7 +76,7 @@ def test_late_scans_are_discarded(ros, reject, left):
 )
 def test_a_clock_is_named_where_there_is_one(ros, wall, monkeypatch, has_clock, stopped, jumped):
     steps = [
-        (1.1, 0.1),
+        (1.1, 30.0),  # the wait for the first step is no stop
         (1.2, 2.0),
         (1.3, 0.1),
         (0.3, 0.1),

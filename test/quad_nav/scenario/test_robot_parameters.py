@@ -45,13 +45,12 @@ def test_a_robots_own_file_and_the_override_are_on_top(folder, tmp_path, capsys)
     assert "robots" not in tree
 
 
-def test_numbered_files_are_required_if_the_user_says_so(folder, capsys):
+def test_files_may_have_the_number_of_their_robot(folder, capsys):
     for path in list(folder.glob("*_params.yaml")):
         path.rename(path.with_name(path.stem + "1.yaml"))
-    arguments = ("--config", folder, "--numbered", "true", "--robot")
-    assert printed(capsys, *arguments, 1)["global_costmap"]["robot_base_frame"] == "base_link1"
-    assert main([*map(str, arguments), "0"]) == 2
-    assert "missing costmap_common_params0.yaml\n" in capsys.readouterr().err
+    tree = printed(capsys, "--config", folder, "--robot", 1)
+    assert tree["global_costmap"]["robot_base_frame"] == "base_link1"
+    assert main(["--config", str(folder), "--robot", "0"]) == 2
 
 
 def test_every_file_with_a_fault_is_named(folder, tmp_path, capsys, monkeypatch):

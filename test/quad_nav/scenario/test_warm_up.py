@@ -27,16 +27,16 @@ from quad_nav.sim import casters
 def missions(monkeypatch):
     """(navigator, its ticks) of each mission that ``fly_missions`` flies."""
     flown = []
-    build = warm_up.build_navigator
+    build = warm_up.NavigatorHost
 
     def recording(configuration):
-        navigator, ticks = build(configuration), []
-        tick = navigator.tick
-        navigator.tick = lambda *arguments: ticks.append(tick(*arguments)) or ticks[-1]
-        flown.append((navigator, ticks))
-        return navigator
+        host, ticks = build(configuration), []
+        tick = host.tick
+        host.tick = lambda *arguments: ticks.append(tick(*arguments)) or ticks[-1]
+        flown.append((host.navigator, ticks))
+        return host
 
-    monkeypatch.setattr(warm_up, "build_navigator", recording)
+    monkeypatch.setattr(warm_up, "NavigatorHost", recording)
     warm_up.fly_missions()
     return flown
 

@@ -34,7 +34,6 @@ class DiagnosticsTopic:
     """A node's publisher on `/diagnostics`."""
 
     def __init__(self) -> None:
-        """Advertise the topic."""
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
         self._levels: Dict[str, int] = {}
 
@@ -102,7 +101,6 @@ class ThrottledWarnings:
     """
 
     def __init__(self) -> None:
-        """Start without logged warnings."""
         self._logged_s: Dict[str, float] = {}
 
     def warn(self, text: str, kind: str = "") -> None:

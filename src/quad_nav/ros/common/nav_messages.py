@@ -6,10 +6,19 @@ import math
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import Point32, PolygonStamped, Pose, PoseStamped
+from geometry_msgs.msg import (
+    Point,
+    Point32,
+    Polygon,
+    PolygonStamped,
+    Pose,
+    PoseStamped,
+    Quaternion,
+)
 from map_msgs.msg import OccupancyGridUpdate
-from nav_msgs.msg import OccupancyGrid, Path
+from nav_msgs.msg import MapMetaData, OccupancyGrid, Path
 from sensor_msgs.msg import PointCloud2, PointField
+from std_msgs.msg import Header
 
 from quad_nav.costmap.cost_grid import occupancy
 from quad_nav.costmap.static import StaticMap
@@ -52,48 +61,23 @@ def planar_pose(pose: Pose2D, z_m: float = 0.0) -> Pose3D:
 
 def pose_stamped(pose: Pose3D, frame: str, stamp: rospy.Time) -> PoseStamped:
     """Convert a pose with its frame and stamp."""
-    message = PoseStamped(pose=pose_message(pose))
-    message.header.frame_id, message.header.stamp = frame, stamp
-    return message
+    return PoseStamped(Header(0, stamp, frame), pose_message(pose))
 
 
 def path_message(plan: np.ndarray, frame: str, stamp: rospy.Time) -> Path:
-    """Convert a plan to a path; every pose has the same stamp.
-
-    Args:
-        plan: float64, shape (n, 3): x and y in m, yaw in rad, in `frame`.
-        frame: Frame of the plan.
-        stamp: Time of the plan.
-    """
-    path = Path()
-    path.header.frame_id, path.header.stamp = frame, stamp
-    path.poses = [pose_stamped(planar_pose(Pose2D(*row)), frame, stamp) for row in plan.tolist()]
-    return path
+    """Convert a plan, float64[n, 3] of (x_m, y_m, yaw_rad); every pose has the path's stamp."""
+    poses = [pose_stamped(planar_pose(Pose2D(*row)), frame, stamp) for row in plan.tolist()]
+    return Path(Header(0, stamp, frame), poses)
 
 
 def polygon_message(points: np.ndarray, frame: str, stamp: rospy.Time) -> PolygonStamped:
-    """Convert a footprint to a polygon.
-
-    Args:
-        points: float64, shape (n, 2), x and y in m, in `frame`.
-        frame: Frame of the points.
-        stamp: Time of the robot's pose.
-    """
-    message = PolygonStamped()
-    message.header.frame_id, message.header.stamp = frame, stamp
-    message.polygon.points = [Point32(x, y, 0.0) for x, y in points.tolist()]
-    return message
+    """Convert a footprint, float64[n, 2] in metres."""
+    corners = [Point32(x, y, 0.0) for x, y in points.tolist()]
+    return PolygonStamped(Header(0, stamp, frame), Polygon(corners))
 
 
 def grid_message(spec: GridSpec, costs: np.ndarray, frame: str, stamp: rospy.Time) -> OccupancyGrid:
-    """Convert the master grid of a costmap to occupancies from 0 to 100 and -1.
-
-    Args:
-        spec: Size and place of the grid.
-        costs: uint8, shape (height, width).
-        frame: Global frame of the costmap.
-        stamp: Time of the grid.
-    """
+    """Convert a costmap's master grid, uint8[height, width], to occupancies 0 to 100 and -1."""
     return _occupancy_grid(spec, occupancy(costs), frame, stamp)
 
 
@@ -105,14 +89,9 @@ def map_message(static_map: StaticMap, stamp: rospy.Time) -> OccupancyGrid:
 def potential_message(
     spec: GridSpec, potential: np.ndarray, scale: int, frame: str, stamp: rospy.Time
 ) -> OccupancyGrid:
-    """Convert the potential of a global planner; cells that it did not reach become -1.
+    """Convert the potential of a global planner, float32[height, width].
 
-    Args:
-        spec: Size and place of the grid.
-        potential: float32, shape (height, width).
-        scale: Value of the greatest potential in the message.
-        frame: Global frame of the costmap.
-        stamp: Time of the plan.
+    Its greatest value becomes ``scale``; cells that it did not reach become -1.
     """
     reached = potential < NOT_REACHED
     highest = potential[reached].max(initial=0.0)
@@ -125,33 +104,18 @@ def potential_message(
 def _occupancy_grid(
     spec: GridSpec, values: np.ndarray, frame: str, stamp: rospy.Time
 ) -> OccupancyGrid:
-    message = OccupancyGrid()
-    message.header.frame_id, message.header.stamp = frame, stamp
-    message.info.resolution = spec.resolution_m
-    message.info.width, message.info.height = spec.size_x, spec.size_y
-    message.info.origin.position.x = spec.origin_x_m
-    message.info.origin.position.y = spec.origin_y_m
-    message.info.origin.orientation.w = 1.0
-    message.data = values.ravel().tolist()
-    return message
+    origin = Pose(Point(spec.origin_x_m, spec.origin_y_m, 0.0), Quaternion(w=1.0))
+    info = MapMetaData(rospy.Time(), spec.resolution_m, spec.size_x, spec.size_y, origin)
+    return OccupancyGrid(Header(0, stamp, frame), info, values.ravel().tolist())
 
 
 def update_message(
     costs: np.ndarray, x0: int, y0: int, frame: str, stamp: rospy.Time
 ) -> OccupancyGridUpdate:
-    """Convert a window of a costmap.
-
-    Args:
-        costs: uint8, shape (height, width) of the window.
-        x0: First column of the window in the costmap.
-        y0: First row of the window in the costmap.
-        frame: Global frame of the costmap.
-        stamp: Time of the costmap.
-    """
-    message = OccupancyGridUpdate(x=x0, y=y0, width=costs.shape[1], height=costs.shape[0])
-    message.header.frame_id, message.header.stamp = frame, stamp
-    message.data = occupancy(costs).ravel().tolist()
-    return message
+    """Convert a window of a costmap, uint8[height, width], that begins at column x0 and row y0."""
+    height, width = costs.shape
+    data = occupancy(costs).ravel().tolist()
+    return OccupancyGridUpdate(Header(0, stamp, frame), x0, y0, width, height, data)
 
 
 CLOUD_FIELDS = ("x", "y", "z", "path_cost", "goal_cost", "occ_cost", "total_cost")
@@ -160,27 +124,20 @@ CLOUD_FIELDS = ("x", "y", "z", "path_cost", "goal_cost", "occ_cost", "total_cost
 def cost_cloud_message(
     points: np.ndarray, cells: int, frame: str, stamp: rospy.Time
 ) -> PointCloud2:
-    """Convert the scored cells of a local planner.
+    """Convert the scored cells of a local planner, float32[n, 7] in columns of `CLOUD_FIELDS`.
 
-    As in C++ move_base, the cloud has one point for each cell of the window, the scored ones
-    first. Points without a score are NaN; viewers skip them.
-
-    Args:
-        points: float32, shape (n, 7), columns as in `CLOUD_FIELDS`.
-        cells: Number of cells of the window.
-        frame: Global frame of the local costmap.
-        stamp: Time of the control cycle.
+    As in C++ move_base, the cloud has one point for each of the ``cells`` of the window, the scored
+    ones first. Points without a score are NaN; viewers skip them.
     """
     data = np.full((cells, len(CLOUD_FIELDS)), np.nan, dtype=np.float32)
     data[: len(points)] = points
-    message = PointCloud2()
-    message.header.frame_id, message.header.stamp = frame, stamp
-    message.height, message.width = 1, len(data)
-    message.fields = [
-        PointField(name, 4 * k, PointField.FLOAT32, 1) for k, name in enumerate(CLOUD_FIELDS)
-    ]
-    message.point_step = 4 * len(CLOUD_FIELDS)
-    message.row_step = message.point_step * len(data)
-    message.is_dense = False
-    message.data = data.tobytes()
-    return message
+    fields = [PointField(name, 4 * k, PointField.FLOAT32, 1) for k, name in enumerate(CLOUD_FIELDS)]
+    return PointCloud2(
+        header=Header(0, stamp, frame),
+        height=1,
+        width=cells,
+        fields=fields,
+        point_step=data.strides[0],
+        row_step=data.nbytes,
+        data=data.tobytes(),
+    )

@@ -7,6 +7,7 @@ bytes are those of rospy's own serialiser.
 
 from __future__ import annotations
 
+import io
 import re
 import struct
 from typing import Any, Callable, List, NamedTuple, Sequence, Tuple
@@ -15,20 +16,22 @@ import genpy
 import numpy as np
 import rospy
 from geometry_msgs.msg import TransformStamped
-from nav_msgs.msg import Path
+from nav_msgs.msg import Odometry, Path
 from numpy.typing import NDArray
 from sensor_msgs.msg import MultiDOFJointState
+from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.conversions import time_message
+from quad_nav.ros.common.rospy_repairs import serialised
 
 STATES_TOPIC = "/quad/states"
 _COUNT = struct.Struct("<I")
 _STAMP = struct.Struct("<2I")
 _HEAD = struct.Struct("<4I")  # seq, seconds, nanoseconds, length of the frame's name
 _POSE, _TWIST = 7, 6
-_COVARIANCE_BYTES = 36 * 8
+_COVARIANCE = 36
 _ROBOT = re.compile(rb"quad(0|[1-9]\d{0,3})")
 _OTHER = -1
 
@@ -81,7 +84,8 @@ def states_message(states: States) -> StatesMessage:
     """Serialise states."""
     stamp, frame = time_message(states.stamp_s), states.frame.encode()
     count = _COUNT.pack(len(states.robots))
-    names = [_text(b"quad%d" % number) for number in states.robots.tolist()]
+    texts = [b"quad%d" % number for number in states.robots.tolist()]
+    names = [_COUNT.pack(len(text)) + text for text in texts]
     message = StatesMessage()
     message.data = b"".join(
         (
@@ -103,7 +107,6 @@ class StatesReader:
     """Read messages whose names are mostly those of the message before."""
 
     def __init__(self) -> None:
-        """Start without known names."""
         self._names, self._robots = b"", np.zeros(0, np.int64)
 
     def read(self, message: StatesMessage) -> States:
@@ -170,11 +173,7 @@ class TransformReader:
     """Read some transforms of messages whose frames are mostly those of the message before."""
 
     def __init__(self, is_wanted: Callable[[str], bool]) -> None:
-        """Start without known frames.
-
-        Args:
-            is_wanted: Returns whether to read the transform of a child frame.
-        """
+        """Read the transforms of child frames that ``is_wanted``."""
         self._is_wanted = is_wanted
         self._length = 0
         self._names: List[Tuple[int, int, bytes]] = []  # start, end and bytes of each pair of names
@@ -222,74 +221,48 @@ class TransformReader:
 
 
 class TransformWriter:
-    """Serialise the same transforms again and again as a `TFMessage`."""
+    """Serialise the same transforms, given as pairs of parent and child, again and again."""
 
     def __init__(self, frames: Sequence[Tuple[str, str]]) -> None:
-        """Lay out the message for these pairs of parent and child frames."""
-        layout = bytearray(_COUNT.pack(len(frames)))
-        stamps, poses = [], []
-        for parent, child in frames:
-            stamps.append(len(layout) + _COUNT.size)
-            layout += bytes(_COUNT.size + _STAMP.size) + _text(parent.encode())
-            layout += _text(child.encode())
-            poses.append(len(layout))
-            layout += bytes(8 * _POSE)
-        self._layout = np.frombuffer(bytes(layout), np.uint8)
-        self._stamps = _places(stamps, _STAMP.size)
-        self._poses = _places(poses, 8 * _POSE)
+        transforms = [TransformStamped(Header(0, None, one), two, None) for one, two in frames]
+        sizes = np.array([len(_bytes(one)) for one in transforms], np.int64)
+        ends = _COUNT.size + np.cumsum(sizes)
+        self._layout = np.frombuffer(_bytes(TFMessage(transforms)), np.uint8)
+        self._stamps = _places(ends - sizes + _COUNT.size, _STAMP.size)
+        self._poses = _places(ends - 8 * _POSE, 8 * _POSE)
 
     def message(self, stamp: rospy.Time, poses: Floats) -> rospy.AnyMsg:
-        """Return the message.
-
-        Args:
-            stamp: Time of all transforms.
-            poses: float64[n, 7], `parent_from_child` as position and quaternion (x, y, z, w).
-        """
+        """Return a `TFMessage` with `parent_from_child`, float64[n, 7] as in `States`."""
         data = self._layout.copy()
         data[self._stamps] = np.frombuffer(_STAMP.pack(stamp.secs, stamp.nsecs), np.uint8)
         rows = np.ascontiguousarray(poses, "<f8")
         data[self._poses] = rows.view(np.uint8).reshape(len(rows), 8 * _POSE)
-        return _serialised(data.tobytes())
+        return serialised(data.tobytes())
 
 
 class OdometryWriter:
     """Serialise the odometry of one robot, without covariances."""
 
     def __init__(self, frame: str, child: str) -> None:
-        """Lay out the message for the odometry frame and the body's frame."""
-        names = frame.encode()
-        self._layout = bytearray(_HEAD.size - _COUNT.size) + _text(names) + _text(child.encode())
-        self._pose = len(self._layout)
-        self._twist = self._pose + 8 * _POSE + _COVARIANCE_BYTES
-        self._layout += bytes(8 * (_POSE + _TWIST) + 2 * _COVARIANCE_BYTES)
+        self._layout = bytearray(_bytes(Odometry(Header(0, None, frame), child, None, None)))
+        self._twist = len(self._layout) - 8 * (_TWIST + _COVARIANCE)
+        self._pose = self._twist - 8 * (_POSE + _COVARIANCE)
         self._seq = 0
 
     def message(self, stamp: rospy.Time, pose: Floats, twist: Floats) -> rospy.AnyMsg:
-        """Return the next message.
-
-        Args:
-            stamp: Time of the pose.
-            pose: float64[7], position and quaternion (x, y, z, w) in the odometry frame.
-            twist: float64[6], velocity and angular velocity in the body's frame.
-        """
+        """Return the next message, with pose float64[7] and twist float64[6] as in `States`."""
         self._seq += 1
         struct.pack_into("<3I", self._layout, 0, self._seq, stamp.secs, stamp.nsecs)
         struct.pack_into("<7d", self._layout, self._pose, *pose.tolist())
         struct.pack_into("<6d", self._layout, self._twist, *twist.tolist())
-        return _serialised(bytes(self._layout))
+        return serialised(bytes(self._layout))
 
 
 class PathMessage(Path):
     """A path whose bytes are made when they are sent: of many paths mostly none is."""
 
     def __init__(self, frame: str, stamp_s: float, poses: Sequence[Tuple[float, Pose3D]]) -> None:
-        """Store the path.
-
-        Args:
-            frame: Frame of the path and of its poses.
-            stamp_s: Time of the path.
-            poses: Poses with their times.
-        """
+        """Store a path in ``frame``: poses with their times."""
         super().__init__()
         self.header.frame_id, self.header.stamp = frame, time_message(stamp_s)
         self._timed_poses = poses
@@ -344,16 +317,12 @@ def pose_row(pose: Pose3D) -> Floats:
     return np.array((pose.x_m, pose.y_m, pose.z_m, *pose.quaternion))
 
 
-def _text(text: bytes) -> bytes:
-    return _COUNT.pack(len(text)) + text
+def _bytes(message: genpy.Message) -> bytes:
+    buffer = io.BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
 
 
-def _places(starts: Sequence[int], size: int) -> NDArray[np.int64]:
+def _places(starts: NDArray[np.int64], size: int) -> NDArray[np.int64]:
     """Return the indices int64[n, size] of the bytes of fields of one size."""
-    return np.array(starts, np.int64).reshape(-1, 1) + np.arange(size)
-
-
-def _serialised(data: bytes) -> rospy.AnyMsg:
-    message = rospy.AnyMsg()
-    message._buff = data
-    return message
+    return starts[:, None] + np.arange(size)

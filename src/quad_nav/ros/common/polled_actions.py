@@ -19,13 +19,7 @@ class PolledActionServer(SimpleActionServer):
     """Action server whose owner asks it for goals and cancel requests."""
 
     def __init__(self, name: str, action: Any, warn: Callable[[str], None]) -> None:
-        """Start the server.
-
-        Args:
-            name: Name of the action.
-            action: Its type.
-            warn: Gets a line for each message that is dropped.
-        """
+        """Start the server; ``warn`` gets a line for each message that is dropped."""
         super().__init__(name, action, auto_start=False)
         self._warn = warn
         self._guard_callbacks()

@@ -8,9 +8,8 @@ import signal
 import socket
 import threading
 import time
-from dataclasses import dataclass
 from types import FrameType
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import rosgraph
 import rosgraph.network
@@ -20,7 +19,9 @@ from quad_nav.errors import QuadError, excerpt, printable
 from quad_nav.ros.common.rospy_repairs import (
     accept_many_connections,
     connect_once,
+    hear_first,
     hear_one_clock,
+    is_registered,
     log_without_master,
     refuse_second,
     register_again,
@@ -93,17 +94,15 @@ def server_parameters() -> Dict[str, Any]:
 
 def escape_log_messages() -> None:
     """Escape what a terminal would obey in all further messages of this node."""
-    logging.getLogger("rosout").addFilter(_EscapedMessages())
+    logging.getLogger("rosout").addFilter(_escape)
 
 
-class _EscapedMessages(logging.Filter):
-    """Escapes and cuts messages and their arguments; lists of faults keep their lines."""
-
-    def filter(self, record: logging.LogRecord) -> bool:
-        record.msg = excerpt(str(record.msg), MAX_LOG, "\n")
-        if isinstance(record.args, tuple):
-            record.args = tuple(map(_printable_argument, record.args))
-        return True
+def _escape(record: logging.LogRecord) -> bool:
+    """Escape and cut a message and its arguments; lists of faults keep their lines."""
+    record.msg = excerpt(str(record.msg), MAX_LOG, "\n")
+    if isinstance(record.args, tuple):
+        record.args = tuple(map(_printable_argument, record.args))
+    return True
 
 
 def _printable_argument(value: object) -> object:
@@ -114,14 +113,8 @@ def _printable_argument(value: object) -> object:
     return excerpt(str(value), MAX_LOG)
 
 
-@dataclass(frozen=True)
-class Need:
-    """A condition to wait for.
-
-    Attributes:
-        is_met: Tests the condition.
-        missing: Says what is missing and what is there instead.
-    """
+class Need(NamedTuple):
+    """A condition to wait for, and a text that says what is missing and what is there instead."""
 
     is_met: Callable[[], bool]
     missing: Callable[[], str]
@@ -171,13 +164,9 @@ class TopicWatch:
 
     def add(self, subscriber: rospy.Subscriber) -> None:
         """Watch the topic of a subscriber too, until it unregisters."""
-        self._silent[subscriber.resolved_name] = subscriber, time.monotonic()
-        subscriber.impl.add_callback(self._on_message, subscriber.resolved_name)
-
-    def _on_message(self, _: rospy.Message, name: str) -> None:
-        subscriber, _since_s = self._silent.pop(name, (None, 0.0))
-        if subscriber is not None and subscriber.impl is not None:
-            subscriber.impl.remove_callback(self._on_message, name)
+        name = subscriber.resolved_name
+        self._silent[name] = subscriber, time.monotonic()
+        hear_first(subscriber, lambda: self._silent.pop(name, None))
 
     def check_clock(self) -> None:
         """Log that `/clock` has not started."""
@@ -191,7 +180,7 @@ class TopicWatch:
         if not self._silent or not self._is_due():
             return
         for name, (subscriber, since_s) in list(self._silent.items()):
-            if subscriber.impl is None:  # it has unregistered
+            if not is_registered(subscriber):
                 self._silent.pop(name, None)
             elif time.monotonic() - since_s >= SILENT_AFTER_S:
                 rospy.logwarn("%s", missing_topic(name, subscriber.type))

@@ -8,6 +8,11 @@
 * It registers once. A ROS master that is started again does not know the node: nobody finds its
   services, and new nodes do not connect to its topics. Those that are connected stay so.
 * Each log call reads a parameter, and asks the master for it as long as it is not set.
+* It connects a subscriber to publishers of its own process too, through a socket.
+* It has no public way to set the time, to add a callback to a subscriber, to ask whether a
+  publisher reaches a node, to send bytes, and to read from which node and topic a message came.
+
+No other file touches what is private in rospy.
 """
 
 from __future__ import annotations
@@ -31,6 +36,7 @@ from rospy.impl.masterslave import ROSHandler
 from rospy.impl.paramserver import get_param_server_cache
 from rospy.impl.registration import get_service_manager, get_topic_manager
 from rospy.impl.tcpros_base import init_tcpros_server
+from rospy.topics import _SubscriberImpl
 
 from quad_nav.errors import excerpt, printable
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
@@ -58,6 +64,58 @@ def connect_once() -> None:
             return _connect_topic(handler, topic, publisher)
 
     ROSHandler._connect_topic = connect
+
+
+def ignore_publishers(is_ignored: Callable[[str, str], bool]) -> None:
+    """Let no subscriber of this process connect to some publishers.
+
+    Args:
+        is_ignored: Called with the name of a topic and the address of a node that publishes it.
+    """
+    is_connected = _SubscriberImpl.has_connection
+
+    def has_connection(subscriber: Any, address: str) -> bool:
+        return is_connected(subscriber, address) or is_ignored(subscriber.resolved_name, address)
+
+    _SubscriberImpl.has_connection = has_connection
+
+
+def sender_of(message: Any) -> str:
+    """Return the name of the node that sent a message; "" if its connection does not say."""
+    return str(message._connection_header.get("callerid", ""))
+
+
+def topic_of(message: Any) -> str:
+    """Return the name of the topic from which a message came; "" if it is not known."""
+    return str(message._connection_header.get("topic", ""))
+
+
+def serialised(data: bytes) -> rospy.AnyMsg:
+    """Return a message that is sent as these bytes."""
+    message = rospy.AnyMsg()
+    message._buff = data
+    return message
+
+
+def is_registered(subscriber: rospy.Subscriber) -> bool:
+    """Return whether a subscriber has not unregistered."""
+    return subscriber.impl is not None
+
+
+def hear_first(subscriber: rospy.Subscriber, on_first: Callable[[], object]) -> None:
+    """Call a function with the first message of a subscriber, beside its own callback."""
+
+    def on_message(_: Any) -> None:
+        if is_registered(subscriber):
+            subscriber.impl.remove_callback(on_message, None)
+        on_first()
+
+    subscriber.impl.add_callback(on_message, None)
+
+
+def reaches(publisher: rospy.Publisher, node: str) -> bool:
+    """Return whether a node has connected to a publisher."""
+    return bool(publisher.impl.has_connection(node))
 
 
 def accept_many_connections() -> None:
@@ -152,7 +210,7 @@ class ClockSource:
 
     def __call__(self, message: Clock) -> None:
         """Set the time of this node, if the message is one of the publisher that counts."""
-        sender = message._connection_header.get("callerid", "")
+        sender = sender_of(message)
         if sender != self._node and time.monotonic() >= self._ask_s.get(sender, 0.0):
             self._choose(sender)
         if sender == self._node:

@@ -43,7 +43,6 @@ class GoalRouterNode:
     """Subscribers and publishers of the node."""
 
     def __init__(self, robots: int) -> None:
-        """Connect to the topics of quadcopters 0 to `robots` - 1."""
         self._router = GoalRouter()
         self._lock = threading.Lock()
         self._warnings = ThrottledWarnings()

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.packed_messages import STATES_TOPIC, States, StatesMessage, StatesReader
+from quad_nav.ros.common.rospy_repairs import sender_of
 from quad_nav.topics.validation import frame_problem, stamp_problem, valid_states
 
 CHECK_S = 0.1  # wall time
@@ -170,7 +171,7 @@ class StateTopics:
             self._on_odometry(robot, message)
 
     def _on_message(self, message: StatesMessage) -> None:
-        if message._connection_header.get("callerid") == rospy.get_name():
+        if sender_of(message) == rospy.get_name():
             return
         try:
             states = self._checked(self._reader.read(message))

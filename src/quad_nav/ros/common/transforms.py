@@ -31,7 +31,6 @@ class TransformUnavailable(NavigationError):
     """
 
     def __init__(self, message: str, later: bool = False) -> None:
-        """Store the reason."""
         super().__init__(excerpt(message, 500))
         self.later = later
 

@@ -49,13 +49,7 @@ class ComposedFleet:
     """
 
     def __init__(self, setup: SimulatorSetup, start_step: int, own: OwnNodes) -> None:
-        """Start the processes and build the navigators of this one.
-
-        Args:
-            setup: The simulation.
-            start_step: Step at which the clock starts.
-            own: Gets the names of the processes' nodes.
-        """
+        """Start the processes, build this one's navigators, and name the nodes in ``own``."""
         self.hosted = tuple(sorted(setup.configurations))
         shares = shares_of(self.hosted, _processes(setup))
         nodes = [rospy.get_name()]

@@ -20,7 +20,7 @@ from quad_nav.ros.common.conversions import ScanMessage, scan_message, time_mess
 from quad_nav.ros.common.diagnostics import publish_health
 from quad_nav.ros.common.readiness import TopicWatch, start_node
 from quad_nav.ros.common.rospy_repairs import set_time
-from quad_nav.ros.composed.own_nodes import OwnNodes, ignore_publishers
+from quad_nav.ros.composed.own_nodes import OwnNodes, hear_others_only
 from quad_nav.ros.composed.robot import ComposedRobot
 from quad_nav.ros.composed.transforms import ComposedTransforms
 from quad_nav.ros.navigator.costmap_publisher import NewSubscriber, Publish
@@ -34,7 +34,6 @@ class ScanTopic:
     """Publish the scans of one robot's LIDAR, the last one to each new subscriber."""
 
     def __init__(self, robot: int) -> None:
-        """Advertise the topic."""
         self._frame = f"Lidar{robot}"
         self._last: Optional[Scan] = None
         self._publisher = rospy.Publisher(
@@ -151,26 +150,16 @@ class GroupMaker:
             return NavigatorGroup(setup, robots, lidars)  # a simulation alone
         if process == 0:
             return ComposedGroup(setup, robots, lidars)
-        return _start_node(self.nodes, process, setup, robots, lidars)
-
-
-def _start_node(
-    nodes: Tuple[str, ...],
-    process: int,
-    setup: LoopSetup,
-    robots: Sequence[int],
-    lidars: Lidars,
-) -> ComposedGroup:
-    ignore_publishers(OwnNodes(nodes), is_handed_over)
-    # The simulator's name, log and remappings of its name do not concern this node.
-    start_node(
-        nodes[process].rsplit("/", 1)[1],
-        [one for one in sys.argv if not one.startswith(("__name:=", "__log:="))],
-        hears_clock=False,
-    )
-    group = _WorkerGroup(setup, robots, lidars)
-    rospy.loginfo("%s: ready, robots: %d", rospy.get_name().lstrip("/"), len(robots))
-    return group
+        hear_others_only(OwnNodes(self.nodes))
+        # The simulator's name, log and remappings of its name do not concern this node.
+        start_node(
+            self.nodes[process].rsplit("/", 1)[1],
+            [one for one in sys.argv if not one.startswith(("__name:=", "__log:="))],
+            hears_clock=False,
+        )
+        group = _WorkerGroup(setup, robots, lidars)
+        rospy.loginfo("%s: ready, robots: %d", rospy.get_name().lstrip("/"), len(robots))
+        return group
 
 
 class _WorkerGroup(ComposedGroup):
@@ -186,8 +175,3 @@ class _WorkerGroup(ComposedGroup):
     def close(self) -> None:
         super().close()
         rospy.signal_shutdown("the simulation is closed")
-
-
-def is_handed_over(topic: str) -> bool:
-    """Tell whether the loop hands over the messages of a topic between the fleet's processes."""
-    return topic in ("/tf", "/tf_static") or topic.startswith("/cmd_vel")

@@ -7,11 +7,12 @@ the loop hands over in memory would arrive a second time: each robot's commands 
 from __future__ import annotations
 
 import threading
-from typing import Any, Callable, Dict, Sequence
+from typing import Dict, Sequence
 
 import rosgraph
 import rospy
-from rospy.topics import _SubscriberImpl
+
+from quad_nav.ros.common.rospy_repairs import ignore_publishers
 
 
 class OwnNodes:
@@ -25,7 +26,6 @@ class OwnNodes:
     """
 
     def __init__(self, names: Sequence[str] = ()) -> None:
-        """Start with the nodes' full names, if they are known."""
         self.names = tuple(names)
         self._lock = threading.Lock()
         self._addresses: Dict[str, str] = {}  # of the nodes, the latest known
@@ -44,18 +44,11 @@ class OwnNodes:
             return address in self._addresses.values()
 
 
-def ignore_publishers(own: OwnNodes, is_handed_over: Callable[[str], bool]) -> None:
-    """Let no subscriber of this process connect to publishers of the fleet's nodes.
+def hear_others_only(own: OwnNodes) -> None:
+    """Let no subscriber of this process hear from the fleet's nodes what the loop hands over."""
+    ignore_publishers(lambda topic, address: is_handed_over(topic) and own.has(address))
 
-    Args:
-        own: Nodes of the fleet.
-        is_handed_over: Tells whether a topic's messages are handed over in memory.
-    """
-    is_connected = _SubscriberImpl.has_connection
 
-    def has_connection(subscriber: Any, endpoint_id: str) -> bool:
-        if is_connected(subscriber, endpoint_id):
-            return True
-        return is_handed_over(subscriber.resolved_name) and own.has(endpoint_id)
-
-    _SubscriberImpl.has_connection = has_connection
+def is_handed_over(topic: str) -> bool:
+    """Tell whether the loop hands over the messages of a topic between the fleet's processes."""
+    return topic in ("/tf", "/tf_static") or topic.startswith("/cmd_vel")

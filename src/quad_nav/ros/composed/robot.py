@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import Dict, List, Optional, Sequence, Tuple
 
 import rospy
 
 from quad_nav.config import Configuration
 from quad_nav.costmap.layered import LayeredCostmap
-from quad_nav.costmap.scan_intake import ScanIntake, Sink, sinks_of
+from quad_nav.costmap.scan_intake import Sink
 from quad_nav.errors import PluginError
 from quad_nav.geometry import Pose3D, Scan, Twist2D
 from quad_nav.loop.navigator_group import LoopRobot
@@ -19,11 +18,11 @@ from quad_nav.peers.peer import Peer
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator import sensors, static_maps
 from quad_nav.ros.navigator.health_meters import InputMeter
-from quad_nav.ros.navigator.intention_topics import IntentionPublisher
+from quad_nav.ros.navigator.intention_topics import robot_publisher
 from quad_nav.ros.navigator.robot_interface import RobotInterface
 from quad_nav.sim.odometry import OdomFrames
 from quad_nav.sim.robot_state import RobotState
-from quad_nav.topics.publishing import Names, in_fleet
+from quad_nav.topics.publishing import in_fleet
 
 _MAP_FRAME = "map"
 
@@ -45,46 +44,33 @@ class ComposedRobot(LoopRobot):
         start_s: float,
         transforms: Transforms,
     ) -> None:
-        """Build the navigator and its interface.
-
-        Args:
-            configuration: Its parameters.
-            number: Number of the robot.
-            frames: Odometry frames of all robots.
-            start_s: Time at which they began to drift.
-            transforms: Transform tree, for goals, sensors and maps in other frames.
-        """
+        """Build the navigator and its interface; the ``frames`` drift from ``start_s`` on."""
+        self._names = names = in_fleet(number)
         super().__init__(configuration, number, frames, start_s)
-        names = in_fleet(number)
-        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
-        lidar = [one for one in sinks_of(costmaps) if _is_of_lidar(one, number, names)]
-        local_frame = costmaps[1].params.global_frame
-        self._intake = ScanIntake(lidar, self.scan_filters, local_frame)
-        self._sensors = sensors.connect(f"quad{number}", costmaps, self.scan_filters, names, lidar)
-        self.intakes = [self._intake, *(sensor.intake for sensor in self._sensors)]
+        self._sensors = sensors.connect(self, names, self._lidar.sinks)
         self._transforms, self._now_s = transforms, start_s
         self._state: Optional[RobotState] = None
+        self._odometry_meter = InputMeter(names("odom"))
+        self._scan_meter = InputMeter(names("scan"), self._lidar.expected_period_s)
+        own_meters = [self._odometry_meter, self._scan_meter][: 2 if self._lidar.sinks else 1]
         self.interface = RobotInterface(
-            configuration,
-            self.navigator,
-            self.scan_filters,
+            self,
             transforms,
             self._located_now,
             names,
-            self.intakes,
-            self._new_meters(names),
+            [*own_meters, *(sensor.meter for sensor in self._sensors)],
         )
-        self._maps = static_maps.connect(costmaps, self.interface.lock, names)
-        self._intention = IntentionPublisher(names, costmaps[0].params.global_frame)
+        self._maps = static_maps.connect(self.costmaps, self.interface.lock, names)
+        global_frame = self.costmaps[0].params.global_frame
+        self._intention = robot_publisher(names, global_frame)
 
-    def _new_meters(self, names: Names) -> List[InputMeter]:
-        self._odometry_meter = InputMeter(names("odom"))
-        self._scan_meter = InputMeter(names("scan"), self._intake.expected_period_s)
-        has_lidar = bool(self._intake.sinks)
+    def lidar_sinks(self) -> List[Sink]:
+        """List the sources of layers that are the simulated LIDAR, in its own frame."""
+        lidar, frames = (self._names("scan"), "LaserScan"), ("", f"Lidar{self._number}")
         return [
-            self._odometry_meter,
-            *([self._scan_meter] if has_lidar else []),
-            *(sensor.meter() for sensor in self._sensors),
+            sink
+            for sink in super().lidar_sinks()
+            if sensors.topic_of(sink, self._names) == lidar and sink.source.sensor_frame in frames
         ]
 
     @property
@@ -108,7 +94,7 @@ class ComposedRobot(LoopRobot):
                 return ""
         if reason:
             self.interface.warnings.warn(
-                sensors.rejection(self.interface.name, reason, self._intake)
+                sensors.rejection(self.interface.name, reason, self._lidar)
             )
         return reason
 
@@ -121,7 +107,7 @@ class ComposedRobot(LoopRobot):
                 sensor.deliver(self._transforms)
             self.interface.poll(now_s)
             self.due_s = -math.inf  # goals, requests and parameters may have changed it
-        self._intention.publish(self.navigator.peers.intention, now_s)
+        self._intention.publish({self._number: self.navigator.peers.intention}, now_s)
 
     def navigate(
         self, now_s: float, state: RobotState, peers: Sequence[Peer]
@@ -129,12 +115,10 @@ class ComposedRobot(LoopRobot):
         """Tick the navigator and publish the results; a plugin's mistake aborts the goal."""
         with self.interface.lock:
             try:
-                start_s = time.perf_counter()
                 tick, located = super().navigate(now_s, state, peers)
-                wall_s = time.perf_counter() - start_s
                 in_global = self._in_costmaps(state.map_from_base, now_s)
                 frame = self.navigator.global_costmap.params.global_frame
-                self.interface.publish(tick, in_global[frame], located, wall_s)
+                self.interface.publish(tick, in_global[frame], located)
             except PluginError as error:
                 self.interface.abort(error)
                 return Tick(now_s, command=Twist2D()), RobotPoses(None, None)
@@ -147,17 +131,7 @@ class ComposedRobot(LoopRobot):
         interface = self.interface
         return static_maps.map_poses(interface.name, costmap, self._transforms, interface.warnings)
 
-    def _located_now(self) -> Tuple[float, RobotPoses]:
+    def _located_now(self) -> RobotPoses:
         if self._state is None:
-            return self._now_s, RobotPoses(None, None)
-        poses = self._in_costmaps(self._state.map_from_base, self._now_s)
-        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
-        in_global, in_local = (poses[one.params.global_frame].to_2d() for one in costmaps)
-        return self._now_s, RobotPoses(in_global, in_local)
-
-
-def _is_of_lidar(sink: Sink, number: int, names: Names) -> bool:
-    """True if a source of a layer is the simulated LIDAR, in its own frame."""
-    return sensors.topic_of(sink, names) == (names("scan"), "LaserScan") and (
-        sink.source.sensor_frame in ("", f"Lidar{number}")
-    )
+            return RobotPoses(None, None)
+        return self._located(self._state.map_from_base, self._now_s)

@@ -21,7 +21,6 @@ class ComposedTransforms(Transforms):
     """
 
     def __init__(self) -> None:
-        """Subscribe to the transforms of other nodes."""
         super().__init__()
         self._present: Optional[Tuple[float, RobotStates, OdomFrames, float]] = None
         self._stored_s = -1.0

@@ -7,7 +7,7 @@ The rules are those of costmap_2d: publish only for subscribers; follow the sche
 from __future__ import annotations
 
 import threading
-from typing import Any, Callable, List
+from typing import Any, Callable
 
 import rospy
 from geometry_msgs.msg import Point, PolygonStamped, Vector3
@@ -23,7 +23,7 @@ from quad_nav.footprint import oriented
 from quad_nav.geometry import Pose2D
 from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.nav_messages import grid_message, polygon_message, update_message
-from quad_nav.topics.publishing import CostmapSchedule, Names, own_node
+from quad_nav.topics.publishing import CostmapSchedule, Names
 
 _VOXEL_COLOUR = ColorRGBA(0.8, 0.3, 0.1, 0.6)
 
@@ -35,7 +35,6 @@ class NewSubscriber(rospy.SubscribeListener):
     """Call a function with the `publish` of each new subscriber."""
 
     def __init__(self, send: Callable[[Publish], None]) -> None:
-        """Start with the function."""
         super().__init__()
         self._send = send
 
@@ -50,30 +49,28 @@ class CostmapPublisher:
     """Publish one costmap below `~<name>/`."""
 
     def __init__(
-        self, name: str, costmap: LayeredCostmap, lock: threading.RLock, names: Names = own_node
+        self, name: str, costmap: LayeredCostmap, lock: threading.RLock, names: Names
     ) -> None:
-        """Advertise the topics.
-
-        Args:
-            name: Namespace of the costmap.
-            costmap: The costmap.
-            lock: Guards the costmap.
-            names: Names of the robot's topics.
-        """
+        """Advertise the topics of costmap ``name``; ``lock`` guards it."""
         self._costmap = costmap
         self._lock = lock
         self._schedule = CostmapSchedule(costmap)
-        self._footprint = rospy.Publisher(names(f"~{name}/footprint"), PolygonStamped, queue_size=1)
+        namespace = names(f"~{name}")
+        self._footprint = rospy.Publisher(f"{namespace}/footprint", PolygonStamped, queue_size=1)
         self._updates = rospy.Publisher(
-            names(f"~{name}/costmap_updates"), OccupancyGridUpdate, queue_size=10
+            f"{namespace}/costmap_updates", OccupancyGridUpdate, queue_size=10
         )
         self._grid = rospy.Publisher(
-            names(f"~{name}/costmap"),
+            f"{namespace}/costmap",
             OccupancyGrid,
             queue_size=1,
             subscriber_listener=NewSubscriber(self._send_full),
         )
-        self._voxels = voxel_publishers(names(f"~{name}"), costmap)
+        self._voxels = [  # C++ costmap_2d has a type of its own, and a node that converts it
+            (rospy.Publisher(f"{namespace}/{one}/voxel_markers", Marker, queue_size=1), layer)
+            for one, layer in costmap.layers.items()
+            if isinstance(layer, VoxelLayer) and layer.params.publish_voxel_map
+        ]
 
     def restart(self, now_s: float) -> None:
         """Restart the schedule after a clock jump."""
@@ -92,8 +89,9 @@ class CostmapPublisher:
             self._footprint.publish(
                 polygon_message(oriented(self._costmap.footprint, pose), params.global_frame, stamp)
             )
-        for voxels in self._voxels:
-            voxels.publish(params.global_frame, stamp)
+        for publisher, layer in self._voxels:
+            if publisher.get_num_connections() > 0:
+                publisher.publish(voxel_marker(layer, params.global_frame, stamp))
         if self._schedule.add(now_s, window):
             self._publish_grid(stamp)
 
@@ -117,32 +115,6 @@ class CostmapPublisher:
         with self._lock:
             message = self._full(rospy.Time.now())
         send(message)
-
-
-class VoxelPublisher:
-    """Publish the marked voxels of one layer as cubes for RViz.
-
-    C++ costmap_2d publishes a message type of its own, and has a node that converts it to cubes.
-    """
-
-    def __init__(self, topic: str, layer: VoxelLayer) -> None:
-        """Advertise the topic."""
-        self._layer = layer
-        self._publisher = rospy.Publisher(topic, Marker, queue_size=1)
-
-    def publish(self, frame: str, stamp: rospy.Time) -> None:
-        """Publish the voxels after an update of the costmap, if a node subscribes."""
-        if self._publisher.get_num_connections() > 0:
-            self._publisher.publish(voxel_marker(self._layer, frame, stamp))
-
-
-def voxel_publishers(namespace: str, costmap: LayeredCostmap) -> List[VoxelPublisher]:
-    """Advertise `<namespace>/<layer>/voxel_markers` of each layer with `publish_voxel_map`."""
-    return [
-        VoxelPublisher(f"{namespace}/{name}/voxel_markers", layer)
-        for name, layer in costmap.layers.items()
-        if isinstance(layer, VoxelLayer) and layer.params.publish_voxel_map
-    ]
 
 
 def voxel_marker(layer: VoxelLayer, frame: str, stamp: rospy.Time) -> Marker:

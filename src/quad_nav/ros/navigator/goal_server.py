@@ -22,24 +22,18 @@ from quad_nav.navigator.tick import Outcome
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.nav_messages import goal_from_message, pose_stamped
 from quad_nav.ros.common.polled_actions import PolledActionServer
+from quad_nav.ros.common.rospy_repairs import reaches
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
-from quad_nav.topics.publishing import Names, own_node
+from quad_nav.topics.publishing import Names
 
 
 class GoalServer:
     """Pass the newest goal to the navigator when it accepts one."""
 
     def __init__(
-        self, number: int, transforms: Transforms, global_frame: str, names: Names = own_node
+        self, number: int, transforms: Transforms, global_frame: str, names: Names
     ) -> None:
-        """Start the action server.
-
-        Args:
-            number: Number of the robot.
-            transforms: Converts goals to the global frame.
-            global_frame: Frame of the navigator's goals.
-            names: Names of the robot's topics.
-        """
+        """Start the server of robot ``number``, whose navigator has goals in ``global_frame``."""
         self._robot = robot = f"quad{number}"
         self._transforms = transforms
         self._global_frame = global_frame
@@ -83,7 +77,7 @@ class GoalServer:
         The connection is made through the master, like any other. On a busy machine it takes a
         while after the start, and a goal published before that is lost.
         """
-        return bool(self._action_goal.impl.has_connection(rospy.get_name()))
+        return reaches(self._action_goal, rospy.get_name())
 
     def poll(self, navigator: Navigator, now_s: float) -> None:
         """Pass a waiting goal or cancel to the navigator, if it accepts one now."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from typing import Any, List, Sequence
+from typing import List, Sequence
 
 import rospy
 
@@ -25,16 +25,6 @@ class InputMeter:
         self._count = self._read = 0
         self._received_s = self._late_s = 0.0
         self._read_wall_s = time.monotonic()
-
-    @classmethod
-    def of(cls, subscriber: rospy.Subscriber, timeout_s: float = 0.0) -> InputMeter:
-        """Count the messages of a subscriber."""
-        meter = cls(subscriber.resolved_name, timeout_s)
-        subscriber.impl.add_callback(meter._on_message, None)
-        return meter
-
-    def _on_message(self, message: Any) -> None:
-        self.add(message.header.stamp.to_sec(), rospy.get_time())
 
     def add(self, stamp_s: float, now_s: float) -> None:
         """Count a message that arrives now."""
@@ -60,13 +50,6 @@ class NavigatorHealth:
     """
 
     def __init__(self, node: str, robot: str, inputs: Sequence[InputMeter]) -> None:
-        """Start with an idle navigator.
-
-        Args:
-            node: Name for the statuses.
-            robot: Name of the robot.
-            inputs: Meters of the robot's input topics.
-        """
         self._node, self._robot, self._inputs = node, robot, inputs
         self._state, self._is_localized = State.IDLE, False
         self._cycles = self._cycles_read = 0
@@ -131,7 +114,6 @@ class LoopHealth:
     """
 
     def __init__(self, robots: Sequence[str]) -> None:
-        """Start with the names of the robots to serve."""
         self._robots = robots
         self._late_s, self._round_s, self._round_now_s = 0.0, time.monotonic(), 0.0
         self._read_wall_s, self._read_cpu_s = time.monotonic(), time.process_time()

@@ -13,7 +13,7 @@ one point, which is NaN. A robot that is in no such message is heard from its ow
 from __future__ import annotations
 
 from functools import partial
-from typing import Dict, Iterable, List, Mapping, Optional, Tuple
+from typing import Any, Callable, Dict, Iterable, List, Mapping, Tuple
 
 import numpy as np
 import rospy
@@ -26,6 +26,7 @@ from quad_nav.peers.peer import Intention, Peer, assumed_intention, idle_priorit
 from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.nav_messages import path_message
+from quad_nav.ros.common.rospy_repairs import sender_of
 from quad_nav.ros.common.state_topics import OwnTopics
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.topics.publishing import Names
@@ -43,85 +44,65 @@ _INTENTION_TOPIC = "/move_base{}/intention"
 REPEAT_S = 0.25
 INTENTION_VALID_S = 2.0  # the navigator that published an older intention has died
 _POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("robot", "<u4"), ("priority", "<f8")])
+_KINDS = {"<f4": PointField.FLOAT32, "<u4": PointField.UINT32, "<f8": PointField.FLOAT64}
 _FIELDS = [
-    PointField("x", 0, PointField.FLOAT32, 1),
-    PointField("y", 4, PointField.FLOAT32, 1),
-    PointField("z", 8, PointField.FLOAT32, 1),
-    PointField("robot", 12, PointField.UINT32, 1),
-    PointField("priority", 16, PointField.FLOAT64, 1),
+    PointField(name, place, _KINDS[kind.str], 1) for name, (kind, place) in _POINT.fields.items()
 ]
 
 
-class _Schedule:
-    """Publish an intention at once when it changes, else every `REPEAT_S`."""
-
-    def __init__(self) -> None:
-        self._published_s = 0.0
-        self._published: Optional[Intention] = None
-
-    def is_due(self, intention: Intention, now_s: float) -> bool:
-        published = self._published
-        is_same = (
-            published is not None
-            and published.path is intention.path
-            and published.priority == intention.priority
-        )
-        return not is_same or not 0.0 <= now_s - self._published_s < REPEAT_S
-
-    def note(self, intention: Intention, now_s: float) -> None:
-        self._published_s, self._published = now_s, intention
-
-
 class IntentionPublisher:
-    """Publish the intention of a robot."""
+    """Publish the intentions of some robots: at once when one changes, else every `REPEAT_S`."""
 
-    def __init__(self, names: Names, frame: str) -> None:
+    def __init__(
+        self,
+        topic: str,
+        data_class: Any,
+        convert: Callable[[Mapping[int, Intention], float], Any],
+        own_connections: int = 0,
+    ) -> None:
         """Advertise the topic.
 
         Args:
-            names: Names of the robot's topics.
-            frame: Frame of the robot's intentions.
-        """
-        self._frame = frame
-        self._publisher = rospy.Publisher(names("~intention"), Path, queue_size=1)
-        self._schedule = _Schedule()
-
-    def publish(self, intention: Intention, now_s: float) -> None:
-        """Publish the intention: at once when it changes, else every `REPEAT_S`."""
-        if self._publisher.get_num_connections() and self._schedule.is_due(intention, now_s):
-            self._schedule.note(intention, now_s)
-            self._publisher.publish(intention_message(intention, self._frame, now_s))
-
-
-class FleetIntentionPublisher:
-    """Publish the intentions of all robots of a host in one message."""
-
-    def __init__(self, robots: Iterable[int], frame: str, own_connections: int) -> None:
-        """Advertise the topic.
-
-        Args:
-            robots: Numbers of the robots.
-            frame: Frame of the intentions.
+            topic: Its name.
+            data_class: Type of its messages.
+            convert: Makes a message of the intentions and the time.
             own_connections: Number of this node's own subscriptions to the topic.
         """
-        self._frame, self._own_connections = frame, own_connections
-        self._publisher = rospy.Publisher(INTENTIONS_TOPIC, PointCloud2, queue_size=10)
-        self._schedules = {robot: _Schedule() for robot in robots}
-        self._intentions: Dict[int, Intention] = {}
+        self._publisher = rospy.Publisher(topic, data_class, queue_size=10)
+        self._convert, self._own_connections = convert, own_connections
+        self._sent_s = 0.0
+        self._sent: Mapping[int, Intention] = {}
 
-    def set(self, robot: int, intention: Intention) -> None:
-        """Store the present intention of a robot."""
-        self._intentions[robot] = intention
-
-    def publish(self, now_s: float) -> None:
-        """Publish all intentions if one is due."""
-        if self._publisher.get_num_connections() <= self._own_connections:
+    def publish(self, intentions: Mapping[int, Intention], now_s: float) -> None:
+        """Publish the present intentions if that is due and another node listens."""
+        if self._publisher.get_num_connections() <= self._own_connections or not intentions:
             return
-        intentions = self._intentions
-        if any(self._schedules[robot].is_due(one, now_s) for robot, one in intentions.items()):
-            for robot, one in intentions.items():
-                self._schedules[robot].note(one, now_s)
-            self._publisher.publish(intentions_message(intentions, self._frame, now_s))
+        is_same = intentions.keys() == self._sent.keys() and all(
+            one.path is self._sent[robot].path and one.priority == self._sent[robot].priority
+            for robot, one in intentions.items()
+        )
+        if not is_same or not 0.0 <= now_s - self._sent_s < REPEAT_S:
+            self._sent_s, self._sent = now_s, dict(intentions)
+            self._publisher.publish(self._convert(intentions, now_s))
+
+
+def robot_publisher(names: Names, frame: str) -> IntentionPublisher:
+    """Return the publisher of one robot's intention in ``frame``."""
+
+    def convert(intentions: Mapping[int, Intention], now_s: float) -> Path:
+        (intention,) = intentions.values()
+        return intention_message(intention, frame, now_s)
+
+    return IntentionPublisher(names("~intention"), Path, convert)
+
+
+def host_publisher(frame: str, own_connections: int) -> IntentionPublisher:
+    """Return the publisher of the intentions of all robots of a host, in one message."""
+
+    def convert(intentions: Mapping[int, Intention], now_s: float) -> PointCloud2:
+        return intentions_message(intentions, frame, now_s)
+
+    return IntentionPublisher(INTENTIONS_TOPIC, PointCloud2, convert, own_connections)
 
 
 class IntentionListener:
@@ -170,29 +151,23 @@ class IntentionListener:
 
     def _on_intentions(self, message: PointCloud2) -> None:
         sent_s, frame = message.header.stamp.to_sec(), message.header.frame_id
-        sender = excerpt(message._connection_header.get("callerid", "an unnamed node"))
+        sender = excerpt(sender_of(message) or "an unnamed node")
         if sender == rospy.get_name():
             return
         try:
             received = intentions_from_message(message, self._robots | self._own)
             if stamp_problem(sent_s, rospy.get_time()):
                 raise ValueError(stamp_problem(sent_s, rospy.get_time()))
-        except ValueError as error:
-            rospy.logwarn_throttle(5.0, f"{INTENTIONS_TOPIC}: intentions dropped: {error}")
-            return
-        for robot in self._own.intersection(received):
-            del received[robot]
-            self._warnings.warn(
-                f"quad{robot}: {sender} flies quad{robot} too, and neither avoids the other;"
-                " expected one navigator for each robot: set another number with"
-                ' <param name="robot" value="..." /> in the <node> of one of them'
-            )
-        try:
+            for robot in self._own.intersection(received):
+                del received[robot]
+                self._warnings.warn(
+                    f"quad{robot}: {sender} flies quad{robot} too, and neither avoids the other;"
+                    " expected one navigator for each robot: set another number with"
+                    ' <param name="robot" value="..." /> in the <node> of one of them'
+                )
             received = self._in_own_frame(received, frame)
-        except TransformUnavailable as error:
-            rospy.logwarn_throttle(
-                5.0, f"{INTENTIONS_TOPIC}: intentions dropped: frame '{frame}': {error}"
-            )
+        except (ValueError, TransformUnavailable) as error:
+            self._warnings.warn(f"{INTENTIONS_TOPIC}: intentions dropped: {error}")
             return
         self._own_topics.hear(np.array(list(received), np.int64))
         for robot, intention in received.items():
@@ -201,15 +176,14 @@ class IntentionListener:
     def _on_intention(self, number: int, message: Path) -> None:
         if self._own_topics.is_in_bulk(number):
             return
-        intention, frame = intention_from_message(message, number), message.header.frame_id
+        intention = intention_from_message(message, number)
         if len(intention.path):
             try:
+                frame = message.header.frame_id
                 intention = self._in_own_frame({number: intention}, frame)[number]
             except TransformUnavailable as error:
-                rospy.logwarn_throttle(
-                    5.0,
-                    f"quad{number}: intention dropped, expecting straight flight: frame '{frame}':"
-                    f" {error}",
+                self._warnings.warn(
+                    f"quad{number}: intention dropped, expecting straight flight: {error}"
                 )
                 self._intentions.pop(number, None)
                 return
@@ -223,7 +197,10 @@ class IntentionListener:
         """
         if not received or frame.lstrip("/") == self._frame.lstrip("/"):
             return received
-        own_from_frame = self._transforms.lookup(self._frame, frame).to_2d()
+        try:
+            own_from_frame = self._transforms.lookup(self._frame, frame).to_2d()
+        except TransformUnavailable as error:
+            raise TransformUnavailable(f"frame '{frame}': {error}") from error
         return {robot: one.transformed(own_from_frame) for robot, one in received.items()}
 
     def set(self, number: int, intention: Intention, now_s: float) -> None:

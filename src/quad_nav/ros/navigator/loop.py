@@ -32,13 +32,7 @@ class NavigatorLoop:
     def __init__(
         self, robots: Sequence[RobotNavigator], peers: Sequence[PeerTopics], period_s: float
     ) -> None:
-        """Start watching topics and publishing health.
-
-        Args:
-            robots: Robots of this process.
-            peers: Sources of the robots' peers.
-            period_s: Shortest time between two rounds.
-        """
+        """Serve ``robots`` with these ``peers``, in rounds that are ``period_s`` apart or more."""
         self._robots, self._peers, self._period_s = robots, peers, period_s
         self._name = robots[0].name if len(robots) == 1 else rospy.get_name().lstrip("/")
         self._topic_watch = TopicWatch(
@@ -46,18 +40,19 @@ class NavigatorLoop:
         )
         self._health = LoopHealth([robot.name for robot in robots])
         self._start_s = self._now_s = 0.0
+        self._wall_s: Optional[float] = None  # of the clock's last step
 
     def run(self) -> None:
         """Wait for the clock, then serve the robots until ROS shuts down."""
         publish_health(self._read_health)
         for robot in self._robots:
             rospy.on_shutdown(robot.stop)
-        self._wait_for_clock()
+        while rospy.get_time() == 0.0 and not rospy.is_shutdown():
+            self._topic_watch.check_clock()
+            rospy.rostime.wallsleep(0.05)
         self._start_s = self._now_s = rospy.get_time()
-        stall = StallDetector(self._start_s)
         while not rospy.is_shutdown():
-            self._update_time()
-            stalled_s = stall.ended_after_s(self._now_s)
+            stalled_s = self._update_time()
             if stalled_s >= STALL_S:
                 rospy.loginfo(
                     "%s: %s for %.1f s; discarding queued messages",
@@ -77,13 +72,18 @@ class NavigatorLoop:
             except rospy.exceptions.ROSTimeMovedBackwardsException:
                 continue
 
-    def _wait_for_clock(self) -> None:
-        while rospy.get_time() == 0.0 and not rospy.is_shutdown():
-            self._topic_watch.check_clock()
-            rospy.rostime.wallsleep(0.05)
+    def _update_time(self) -> float:
+        """Take the time; return how long the clock stood still, in wall time, 0 until it moves.
 
-    def _update_time(self) -> None:
+        A process was stopped, a link was cut, or the simulation paused. Messages that queued up
+        meanwhile are old; the robots must not act on the first of them. The clock of the system
+        does not stop, then this is how long the process did. What comes before the clock's first
+        step is no stop: the simulator waits for the robots.
+        """
         before_s, self._now_s = self._now_s, rospy.get_time()
+        if self._now_s == before_s:
+            return 0.0
+        before_wall_s, self._wall_s = self._wall_s, time.monotonic()
         if self._now_s < before_s:
             rospy.logwarn(
                 "%s: %s jumped back by %.2f s; restarting all schedules",
@@ -94,6 +94,7 @@ class NavigatorLoop:
             self._start_s = self._now_s
             for robot in self._robots:
                 robot.restart(self._now_s)
+        return 0.0 if before_wall_s is None else self._wall_s - before_wall_s
 
     def _step(self, now_s: float) -> None:
         for one in self._peers:
@@ -117,26 +118,3 @@ class NavigatorLoop:
             self._health.read(now_s),
             *(one for robot in self._robots for one in robot.health.read(now_s)),
         ]
-
-
-class StallDetector:
-    """Measure how long the clock has stopped: a stopped process, a cut link or a pause.
-
-    The clock of the system does not stop; then it measures how long the process has.
-
-    Messages that queued up meanwhile are old. The robots must not act on the first of them. What
-    comes before the clock's first step is no stop: the simulator waits for the robots.
-    """
-
-    def __init__(self, now_s: float) -> None:
-        """Start measuring at a time of the clock."""
-        self._now_s = now_s
-        self._wall_s: Optional[float] = None  # of the clock's last step
-
-    def ended_after_s(self, now_s: float) -> float:
-        """Return how long the clock stood still before `now_s`, in wall time; 0 until it moves."""
-        if now_s == self._now_s:
-            return 0.0
-        before_s, self._wall_s = self._wall_s, time.monotonic()
-        self._now_s = now_s
-        return 0.0 if before_s is None else self._wall_s - before_s

@@ -12,7 +12,6 @@ from typing import Callable, Collection, Dict, Iterable, List, Mapping, Tuple
 
 import rospy
 
-from quad_nav import config
 from quad_nav.config import Configuration
 from quad_nav.errors import InputError, PluginError, printable
 from quad_nav.files.kernel_cache import cache_warnings
@@ -22,6 +21,7 @@ from quad_nav.ros.navigator.loop import NavigatorLoop
 from quad_nav.ros.navigator.peer_topics import PeerTopics
 from quad_nav.ros.navigator.robot_identity import MAX_ROBOTS, identified
 from quad_nav.ros.navigator.robot_navigator import RobotNavigator
+from quad_nav.scenario.navigator_parameters import load_navigator
 from quad_nav.scenario.warm_up import warm_up
 from quad_nav.topics.publishing import Names, in_fleet, own_node
 
@@ -74,7 +74,10 @@ def move_base() -> int:
 
     def configurations() -> Dict[int, Configuration]:
         given = rospy.get_param("~", {})
-        one = identified(config.load(given, rospy.get_name()), given)
+        one = load_navigator(
+            given, rospy.get_name(), {"simulator": rospy.get_param("/simulator", {})}
+        )
+        one = identified(one, given)
         return {one.robot: one}
 
     return _run(configurations, lambda _: own_node)

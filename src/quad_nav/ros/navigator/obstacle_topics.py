@@ -9,7 +9,7 @@ from visualization_msgs.msg import MarkerArray
 from quad_nav.costmap.scan_filter import ScanFilters
 from quad_nav.ros.common.conversions import replacing_markers
 from quad_nav.ros.common.own_messages import stamped
-from quad_nav.topics.publishing import Names, own_node
+from quad_nav.topics.publishing import Names
 from quad_nav.topics.tracked_obstacles import (
     MARKERS_TOPIC,
     TRACKS_TOPIC,
@@ -22,8 +22,7 @@ from quad_nav.topics.tracked_obstacles import (
 class ObstacleTopics:
     """Publishes the tracks of a robot's scan filters where someone listens."""
 
-    def __init__(self, filters: ScanFilters, frame: str, names: Names = own_node) -> None:
-        """Advertise the topics; ``frame`` is that of the tracks."""
+    def __init__(self, filters: ScanFilters, frame: str, names: Names) -> None:
         self._filters, self._frame, self._schedule = filters, frame, TrackSchedule()
         self._markers = rospy.Publisher(names(f"~{MARKERS_TOPIC}"), MarkerArray, queue_size=1)
         self._obstacles = rospy.Publisher(names(f"~{TRACKS_TOPIC}"), MovingObstacles, queue_size=1)

@@ -7,7 +7,7 @@ other hosts in one message.
 
 from __future__ import annotations
 
-from typing import Dict, List, Mapping, NamedTuple, Optional, Set, Tuple
+from typing import Dict, List, Mapping, Optional, Set, Tuple
 
 import numpy as np
 import rospy
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from quad_nav.geometry import Pose2D, yaws_from_quaternions
 from quad_nav.peers.peer import Intention, Peer
 from quad_nav.ros.common.conversions import odometry_from_message, time_message
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.packed_messages import (
     STATES_TOPIC,
     Floats,
@@ -29,21 +30,13 @@ from quad_nav.ros.common.readiness import TopicWatch
 from quad_nav.ros.common.state_topics import StateTopics
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.ros.navigator.intention_topics import (
-    FleetIntentionPublisher,
     IntentionListener,
-    IntentionPublisher,
+    host_publisher,
+    robot_publisher,
 )
 from quad_nav.ros.navigator.robot_identity import MAX_ROBOTS
 from quad_nav.topics.publishing import Names
 from quad_nav.topics.validation import odometry_problem, stamp_problem
-
-
-class _Located(NamedTuple):
-    """A state in the global frame: pose float64[7] and velocities float64[6] as in `States`."""
-
-    stamp_s: float
-    pose: Floats
-    twist: Floats
 
 
 class PeerTopics:
@@ -72,7 +65,7 @@ class PeerTopics:
         self._states = np.full((robots, 5), np.nan)  # x, y, vx, vy in the frame, and the stamp
         self._peers: Dict[int, Peer] = {}  # of the last refresh, those that were asked for
         self._snapshot, self._now_s = self._states.copy(), 0.0
-        self._topic_watch = TopicWatch()
+        self._topic_watch, self._warnings = TopicWatch(), ThrottledWarnings()
         # Alone there is no peer to hear, and none that listens.
         self._topics = self._subscribe(robots, own) if robots > 1 else None
         self._publisher = rospy.Publisher(STATES_TOPIC, StatesMessage, queue_size=10)
@@ -83,12 +76,11 @@ class PeerTopics:
             own,
             self._finds,
         )
+        self._own_intentions: Dict[int, Intention] = {}
         self._publishers = {
-            number: IntentionPublisher(names, global_frame) for number, names in own.items()
+            number: robot_publisher(names, global_frame) for number, names in own.items()
         }
-        self._fleet_publisher = FleetIntentionPublisher(
-            own, global_frame, len(self._intentions.subscribers)
-        )
+        self._host_publisher = host_publisher(global_frame, len(self._intentions.subscribers))
 
     def _subscribe(self, robots: int, own: Mapping[int, Names]) -> StateTopics:
         return StateTopics(
@@ -111,13 +103,12 @@ class PeerTopics:
         if states.frame.lstrip("/") == self._frame.lstrip("/"):
             self._store(states, Pose2D(0.0, 0.0))
             return True
+        stamp = time_message(states.stamp_s)
         try:
-            pose = self._transforms.lookup_near(
-                self._frame, states.frame, time_message(states.stamp_s)
-            )
+            pose = self._transforms.lookup_near(self._frame, states.frame, stamp)
         except TransformUnavailable as error:
-            rospy.logwarn_throttle(
-                5.0, f"{STATES_TOPIC}: states dropped: pose in {self._frame} unknown: {error}"
+            self._warnings.warn(
+                f"{STATES_TOPIC}: states dropped: pose in {self._frame} unknown: {error}"
             )
             return False
         self._store(states, pose.to_2d())
@@ -144,7 +135,7 @@ class PeerTopics:
         if self._finds:
             self._log_found()
         self._peers.clear()
-        self._fleet_publisher.publish(now_s)
+        self._host_publisher.publish(self._own_intentions, now_s)
 
     def _log_found(self) -> None:
         known = set(np.flatnonzero(~np.isnan(self._snapshot[:, 0])).tolist())
@@ -157,19 +148,15 @@ class PeerTopics:
         if not self._odometry:
             return
         messages, self._odometry = self._odometry, {}
-        by_stamp: Dict[float, List[Tuple[int, _Located]]] = {}
+        by_stamp: Dict[float, List[Tuple[int, Floats, Floats]]] = {}
         for number, message in messages.items():
             state = self._located(number, message)
             if state is not None:
-                by_stamp.setdefault(state.stamp_s, []).append((number, state))
-        for stamp_s, group in by_stamp.items():
-            states = States(
-                stamp_s,
-                self._frame,
-                np.array([number for number, _ in group], np.int64),
-                np.array([state.pose for _, state in group]),
-                np.array([state.twist for _, state in group]),
-            )
+                stamp_s = message.header.stamp.to_sec()
+                by_stamp.setdefault(stamp_s, []).append((number, *state))
+        for stamp_s, rows in by_stamp.items():
+            numbers, poses, twists = (np.array(column) for column in zip(*rows))
+            states = States(stamp_s, self._frame, numbers, poses, twists)
             self._store(states, Pose2D(0.0, 0.0))
             own = states.of(np.isin(states.robots, list(self._own)))
             if len(own.robots) and self._publisher.get_num_connections() > 1:  # one is its own
@@ -198,29 +185,25 @@ class PeerTopics:
             self._peers[number] = peer
         return peer
 
-    def _located(self, number: int, odometry: Odometry) -> Optional[_Located]:
-        """Return a state from odometry in the global frame; None if it is not valid."""
-        name, stamp_s = f"quad{number}", odometry.header.stamp.to_sec()
+    def _located(self, number: int, odometry: Odometry) -> Optional[Tuple[Floats, Floats]]:
+        """Return pose and velocities in the global frame as in `States`; None if not valid."""
+        header, twist = odometry.header, odometry.twist.twist
         try:
             global_from_odom = self._transforms.lookup_near(
-                self._frame, odometry.header.frame_id, odometry.header.stamp
+                self._frame, header.frame_id, header.stamp
             )
         except TransformUnavailable as error:
-            rospy.logwarn_throttle(
-                5.0, f"{name}: pose in {self._frame} unknown, ignoring this peer: {error}"
+            problem = f"pose in {self._frame} unknown: {error}"
+        else:
+            odom_from_base, velocity = odometry_from_message(odometry)
+            problem = odometry_problem(header.frame_id, odom_from_base, velocity) or stamp_problem(
+                header.stamp.to_sec(), rospy.get_time()
             )
-            return None
-        odom_from_base, velocity = odometry_from_message(odometry)
-        problem = odometry_problem(
-            odometry.header.frame_id, odom_from_base, velocity
-        ) or stamp_problem(stamp_s, rospy.get_time())
         if problem:
-            rospy.logwarn_throttle(5.0, f"{name}: odometry dropped, ignoring this peer: {problem}")
+            self._warnings.warn(f"quad{number}: odometry dropped, ignoring this peer: {problem}")
             return None
-        twist = odometry.twist.twist
         linear, angular = twist.linear, twist.angular
-        return _Located(
-            stamp_s,
+        return (
             pose_row(global_from_odom.compose(odom_from_base)),
             np.array((linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)),
         )
@@ -228,5 +211,5 @@ class PeerTopics:
     def publish(self, number: int, intention: Intention, now_s: float) -> None:
         """Publish a robot's intention: at once when it changes, else from time to time."""
         self._intentions.set(number, intention, now_s)
-        self._fleet_publisher.set(number, intention)
-        self._publishers[number].publish(intention, now_s)
+        self._own_intentions[number] = intention
+        self._publishers[number].publish({number: intention}, now_s)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from typing import Callable, Tuple
+from typing import Callable
 
 import rospy
 from nav_msgs.srv import GetPlan, GetPlanRequest, GetPlanResponse
@@ -12,12 +12,14 @@ from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 from quad_nav.config.plugins import plugin_name
 from quad_nav.errors import InvalidGoal, PlanningError
 from quad_nav.geometry import Pose2D
-from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import RobotPoses, State
 from quad_nav.ros.common.nav_messages import goal_from_message, path_message
 from quad_nav.ros.navigator.plan_topics import PlanTopics
+from quad_nav.scenario.navigator_host import NavigatorHost
 from quad_nav.topics.publishing import Names
 
+Locate = Callable[[], RobotPoses]
+"""Returns the robot's poses of now."""
 MAX_TOLERANCE_M = 10.0  # of a plan that a service makes
 
 
@@ -26,26 +28,16 @@ class PlanServices:
 
     def __init__(
         self,
-        navigator: Navigator,
+        host: NavigatorHost,
         topics: PlanTopics,
         lock: threading.RLock,
-        locate: Callable[[], Tuple[float, RobotPoses]],
-        clearing_radius_m: Callable[[], float],
+        locate: Locate,
         names: Names,
     ) -> None:
-        """Advertise the services.
-
-        Args:
-            navigator: Makes the plans.
-            topics: Publish the plans.
-            lock: Guards the navigator.
-            locate: Returns the time and the robot's poses.
-            clearing_radius_m: Returns the radius that is freed around the robot.
-            names: Names of the robot's services.
-        """
-        self._navigator, self._topics, self._lock = navigator, topics, lock
-        self._locate, self._clearing_radius_m = locate, clearing_radius_m
-        planner = plugin_name(navigator.params.base_global_planner)
+        """Advertise the services; ``lock`` guards the navigator."""
+        self._host, self._navigator = host, host.navigator
+        self._topics, self._lock, self._locate = topics, lock, locate
+        planner = plugin_name(host.navigator.params.base_global_planner)
         self._services = [
             rospy.Service(names("~make_plan"), GetPlan, self._make_plan),
             rospy.Service(names(f"~{planner}/make_plan"), GetPlan, self._make_planner_plan),
@@ -59,7 +51,8 @@ class PlanServices:
                     "move_base must be in an inactive state to make a plan for an external user"
                 )
             if self._navigator.params.make_plan_clear_costmap:
-                self._navigator.free_surroundings(self._locate()[1], self._clearing_radius_m())
+                radius_m = self._host.configuration.clearing_radius_m
+                self._navigator.free_surroundings(self._locate(), radius_m)
             return self._plan_response(request)
 
     def _make_planner_plan(self, request: GetPlanRequest) -> GetPlanResponse:
@@ -97,7 +90,7 @@ class PlanServices:
     def _start(self, request: GetPlanRequest) -> Pose2D:
         if request.start.header.frame_id:
             return goal_from_message(request.start.pose).to_2d()
-        here = self._locate()[1].in_global
+        here = self._locate().in_global
         if here is None:
             raise rospy.ServiceException("the robot pose is unknown")
         return here

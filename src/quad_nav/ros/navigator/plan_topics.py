@@ -25,16 +25,17 @@ from quad_nav.ros.common.nav_messages import (
     potential_message,
 )
 from quad_nav.ros.common.own_messages import stamped
-from quad_nav.topics.publishing import Names, own_node
+from quad_nav.topics.publishing import Names
 from quad_nav.topics.robot_topics import ROBOT_TOPICS, RobotTopicSchedule
 
 
 class PlanTopics:
     """Publish command, plans, scores, state, right of way and recoveries."""
 
-    def __init__(self, robot: str, navigator: Navigator, names: Names = own_node) -> None:
-        """Advertise the topics of a navigator; ``robot`` is the robot's name."""
-        self._robot, self._navigator = robot, navigator
+    def __init__(self, navigator: Navigator, names: Names) -> None:
+        self._navigator = navigator
+        self._global_frame = navigator.global_costmap.params.global_frame
+        self._local_frame = navigator.local_costmap.params.global_frame
         planner = plugin_name(navigator.params.base_global_planner)
         controller = plugin_name(navigator.params.base_local_planner)
         self._command = rospy.Publisher(names("cmd_vel"), Twist, queue_size=1)
@@ -61,14 +62,6 @@ class PlanTopics:
             names("move_base/recovery_status"), RecoveryStatus, queue_size=1
         )
 
-    @property
-    def _global_frame(self) -> str:
-        return self._navigator.global_costmap.params.global_frame
-
-    @property
-    def _local_frame(self) -> str:
-        return self._navigator.local_costmap.params.global_frame
-
     def publish(self, tick: Tick, pose: Pose3D) -> None:
         """Publish the results of a tick; `pose` is the robot's in the global frame."""
         now = time_message(tick.now_s)
@@ -79,8 +72,9 @@ class PlanTopics:
             self._command.publish(twist_message(tick.command))
         if tick.plan is not None:
             self.publish_plan(tick.plan, now)
-        if tick.planning_failed:
-            self._clear_plan(now)
+        if tick.planning_failed and self._plan.get_num_connections() > 0:
+            nothing = path_message(np.zeros((0, 3)), self._global_frame, now)
+            self._plan.publish(nothing)  # removes the previous plan from displays
         if tick.plan is not None or tick.planning_failed:
             self._publish_potential(now)
         if tick.recovery is not None:
@@ -111,11 +105,6 @@ class PlanTopics:
             self._plan.publish(Path(message.header, message.poses[:-1]))
         self._plan.publish(message)
 
-    def _clear_plan(self, now: rospy.Time) -> None:
-        """Remove the previous plan from displays after a failed search."""
-        if self._plan.get_num_connections() > 0:
-            self._plan.publish(path_message(np.zeros((0, 3)), self._global_frame, now))
-
     def _publish_potential(self, now: rospy.Time) -> None:
         planner = self._navigator.planner
         if (
@@ -142,15 +131,11 @@ class PlanTopics:
         if len(control.local_plan) and self._local_plan.get_num_connections() > 0:
             self._local_plan.publish(path_message(control.local_plan, self._local_frame, now))
         if self._cost_cloud.get_num_connections() > 0:
-            self._publish_cost_cloud(now)
-
-    def _publish_cost_cloud(self, now: rospy.Time) -> None:
-        points = self._navigator.controller.cost_cloud()
-        if len(points):
-            spec = self._navigator.local_costmap.spec
-            self._cost_cloud.publish(
-                cost_cloud_message(points, spec.size_x * spec.size_y, self._local_frame, now)
-            )
+            points = self._navigator.controller.cost_cloud()
+            if len(points):
+                spec = self._navigator.local_costmap.spec
+                cells = spec.size_x * spec.size_y
+                self._cost_cloud.publish(cost_cloud_message(points, cells, self._local_frame, now))
 
     def stop(self) -> None:
         """Publish a zero velocity."""

@@ -18,7 +18,7 @@ from quad_nav import config
 from quad_nav.errors import InputError
 from quad_nav.parameter import Parameter
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
-from quad_nav.topics.publishing import Names, own_node
+from quad_nav.topics.publishing import Names
 
 OnReconfigure = Callable[[str, Dict[str, Any]], config.Configuration]
 
@@ -76,7 +76,7 @@ def serve_namespaces(
     robot: str,
     configuration: config.Configuration,
     on_reconfigure: OnReconfigure,
-    names: Names = own_node,
+    names: Names,
 ) -> List[Server]:
     """Put a configuration on the parameter server and serve all its namespaces.
 
@@ -92,7 +92,7 @@ def serve_namespaces(
     servers = []
     for namespace, parameters in config.reconfigurable(configuration).items():
         name = (namespace or "move_base").replace("/", "_") + "_config"
-        callback = _Callback(robot, namespace, configuration, on_reconfigure)
+        callback = _callback(robot, namespace, configuration, on_reconfigure)
         values = config.values(configuration, namespace)
         type_ = config_type(name, parameters)
         servers.append(ParameterServer(type_, callback, names(f"~{namespace}"), values))
@@ -107,14 +107,6 @@ class ParameterServer(Server):
     """
 
     def __init__(self, type_: Any, callback: Any, namespace: str, values: Dict[str, Any]) -> None:
-        """Serve parameters.
-
-        Args:
-            type_: Result of `config_type`.
-            callback: Called with the requested values and a level; returns those then in force.
-            namespace: Their namespace; "~" is the node's own one.
-            values: The present values, which are on the parameter server.
-        """
         self._stored = dict(values)
         self._warnings = ThrottledWarnings()
         super().__init__(type_, callback, "" if namespace == "~" else namespace)
@@ -146,37 +138,25 @@ class ParameterServer(Server):
                 self._stored[name] = self.config[name]
 
 
-class _Callback:
-    """Request a change and return the values in force."""
+def _callback(
+    robot: str, namespace: str, configuration: config.Configuration, on_reconfigure: OnReconfigure
+) -> Callable[[Any, int], Any]:
+    """Return what requests a change and returns the values in force."""
+    values, warnings = config.values(configuration, namespace), ThrottledWarnings()
 
-    def __init__(
-        self,
-        robot: str,
-        namespace: str,
-        configuration: config.Configuration,
-        on_reconfigure: OnReconfigure,
-    ) -> None:
-        self._robot = robot
-        self._namespace = namespace
-        self._values = config.values(configuration, namespace)
-        self._on_reconfigure = on_reconfigure
-        self._warnings = ThrottledWarnings()
-
-    def __call__(self, requested: Any, level: int) -> Any:
-        changes = {
-            name: requested[name]
-            for name, value in self._values.items()
-            if requested[name] != value
-        }
+    def change(requested: Any, level: int) -> Any:
+        nonlocal values
+        changes = {name: requested[name] for name in values if requested[name] != values[name]}
         # The server's first call, at its start, brings the loaded values: no change.
         if changes:
             try:
-                configuration = self._on_reconfigure(self._namespace, changes)
-                self._values = config.values(configuration, self._namespace)
+                values = config.values(on_reconfigure(namespace, changes), namespace)
             except InputError as error:
-                self._warnings.error(f"{self._robot}: reconfiguration refused:\n{error}")
-        requested.update(self._values)
+                warnings.error(f"{robot}: reconfiguration refused:\n{error}")
+        requested.update(values)
         return requested
+
+    return change
 
 
 def _description(parameter: Parameter) -> Dict[str, Any]:
@@ -211,19 +191,9 @@ def _edit_method(parameter: Parameter) -> str:
     if not parameter.choices:
         return ""
     ctype = _CTYPES[parameter.kind]
-    return str(
-        {
-            "enum": [
-                {
-                    "name": choice.name,
-                    "type": parameter.kind,
-                    "value": choice.value,
-                    "description": choice.description,
-                    "ctype": ctype,
-                    "cconsttype": "const " + ctype,
-                }
-                for choice in parameter.choices
-            ],
-            "enum_description": parameter.choices_description,
-        }
-    )
+    kind = {"type": parameter.kind, "ctype": ctype, "cconsttype": "const " + ctype}
+    choices = [
+        {"name": one.name, "value": one.value, "description": one.description, **kind}
+        for one in parameter.choices
+    ]
+    return str({"enum": choices, "enum_description": parameter.choices_description})

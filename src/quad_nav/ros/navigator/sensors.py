@@ -8,36 +8,29 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Deque, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 import rospy
 from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud, PointCloud2, PointField
 
-from quad_nav.costmap.layered import LayeredCostmap
-from quad_nav.costmap.scan_filter import ScanFilters
 from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, Sink, sinks_of
 from quad_nav.errors import excerpt
-from quad_nav.geometry import Pose3D, Scan
+from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.conversions import ScanMessage, scan_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.ros.navigator.health_meters import InputMeter
-from quad_nav.topics.publishing import Names, own_node
+from quad_nav.scenario.navigator_host import NavigatorHost
+from quad_nav.topics.publishing import Names
 from quad_nav.topics.validation import MAX_MAGNITUDE, MAX_POINTS, scan_problem, stamp_problem
 
 MESSAGE_TYPES = {"LaserScan": ScanMessage, "PointCloud": PointCloud, "PointCloud2": PointCloud2}
 QUEUE_LENGTH = 50
 _FIELD_TYPES = {
-    PointField.INT8: np.int8,
-    PointField.UINT8: np.uint8,
-    PointField.INT16: np.int16,
-    PointField.UINT16: np.uint16,
-    PointField.INT32: np.int32,
-    PointField.UINT32: np.uint32,
-    PointField.FLOAT32: np.float32,
-    PointField.FLOAT64: np.float64,
+    getattr(PointField, kind.upper()): kind
+    for kind in ("int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64")
 }
 
 
@@ -48,22 +41,16 @@ class Sensor:
         topic: Resolved name of the topic.
         data_type: Key of `MESSAGE_TYPES`.
         intake: Validates messages and hands them to the layers.
+        meter: Counts the messages.
         subscriber: Fills the queue of waiting messages.
     """
 
-    def __init__(
-        self,
-        robot: str,
-        topic: str,
-        data_type: str,
-        sinks: Sequence[Sink],
-        filters: ScanFilters,
-        local_frame: str,
-    ) -> None:
+    def __init__(self, host: NavigatorHost, topic: str, data_type: str, sinks: List[Sink]) -> None:
         self.topic = topic
         self.data_type = data_type
-        self.intake = ScanIntake(sinks, filters, local_frame)
-        self._robot = robot
+        self.intake = host.new_intake(sinks)
+        self.meter = InputMeter(rospy.resolve_name(topic), self.intake.expected_period_s)
+        self._robot = f"quad{host.configuration.robot}"
         self._waiting: Deque[Tuple[Any, float]] = deque(maxlen=QUEUE_LENGTH)
         self._warnings = ThrottledWarnings()
         self._lock = threading.Lock()
@@ -73,6 +60,7 @@ class Sensor:
 
     def _store(self, message: Any) -> None:
         now_s = rospy.get_time()
+        self.meter.add(message.header.stamp.to_sec(), now_s)
         problem = stamp_problem(message.header.stamp.to_sec(), now_s)
         if problem:
             self._warn_dropped(problem)
@@ -80,30 +68,24 @@ class Sensor:
         with self._lock:
             self._waiting.append((message, now_s))
 
-    def meter(self) -> InputMeter:
-        """Return a meter of the topic's messages."""
-        return InputMeter.of(self.subscriber, self.intake.expected_period_s)
-
-    def reset(self) -> None:
-        """Forget waiting messages and earlier scans, after the clock has jumped."""
+    def clear(self) -> None:
+        """Forget waiting messages, after the clock has jumped."""
         with self._lock:
             self._waiting.clear()
-        self.intake.reset()
 
     def discard_late(self) -> None:
         """Discard the waiting scans that are too old to be used, after the clock has stopped."""
-        if self.data_type != "LaserScan":
-            return
         now_s = rospy.get_time()
+        if self.data_type == "LaserScan":
+            self._keep(lambda one: not self.intake.is_late(one.header.stamp.to_sec(), now_s))
+
+    def _keep(self, is_kept: Callable[[Any], bool]) -> None:
         with self._lock:
-            self._waiting = deque(
-                (
-                    (message, received_s)
-                    for message, received_s in self._waiting
-                    if not self.intake.is_late(message.header.stamp.to_sec(), now_s)
-                ),
-                maxlen=QUEUE_LENGTH,
-            )
+            kept = [waiting for waiting in self._waiting if is_kept(waiting[0])]
+            self._waiting = deque(kept, QUEUE_LENGTH)
+
+    def _drop(self, message: Any) -> None:
+        self._keep(lambda one: one is not message)
 
     def deliver(self, transforms: Transforms) -> None:
         """Hand every message whose transforms are known to the layers.
@@ -123,12 +105,6 @@ class Sensor:
                 self._drop(message)
                 self._hand_over(message, received_s, poses)
 
-    def _drop(self, message: Any) -> None:
-        with self._lock:
-            self._waiting = deque(
-                (one for one in self._waiting if one[0] is not message), maxlen=QUEUE_LENGTH
-            )
-
     def _warn_dropped(self, reason: str) -> None:
         self._warnings.warn(f"{self._robot}: {self.topic}: message dropped: {reason}")
 
@@ -143,21 +119,11 @@ class Sensor:
         except TransformUnavailable as error:
             if not error.later:
                 raise
-        if self._is_ahead(transforms, message):
-            return None
+        frame, latest_s = message.header.frame_id, message.header.stamp.to_sec()
+        global_frame = self.intake.sinks[0].costmap.params.global_frame
+        if transforms.locate(global_frame, frame, latest_s, 0.0) is None:
+            return None  # the stamp is younger than tf's latest transform
         return self._poses(transforms, message)  # they may have come in this moment
-
-    def _is_ahead(self, transforms: Transforms, message: Any) -> bool:
-        """Tell whether the message's stamp is younger than tf's latest transform."""
-        return (
-            transforms.locate(
-                self.intake.sinks[0].costmap.params.global_frame,
-                message.header.frame_id,
-                message.header.stamp.to_sec(),
-                0.0,
-            )
-            is None
-        )
 
     def _poses(self, transforms: Transforms, message: Any) -> List[SensorPose]:
         """Look up the sensor's poses for each sink, each pair of frames once."""
@@ -179,20 +145,20 @@ class Sensor:
 
     def _hand_over(self, message: Any, received_s: float, poses: List[SensorPose]) -> None:
         try:
-            if self.data_type == "LaserScan":
-                reason = self.intake.add_scan(
-                    _checked_scan(message), poses, received_s, rospy.get_time()
-                )
-                if reason:
-                    self._warn_rejected(reason)
-            else:
+            if self.data_type != "LaserScan":
                 points, stamp_s = _cloud_points(message), message.header.stamp.to_sec()
                 self.intake.add_cloud(points, poses, stamp_s, received_s)
+                return
+            scan = scan_from_message(message)
+            problem = scan_problem(scan)
+            if problem:
+                raise ValueError(problem)
+            reason = self.intake.add_scan(scan, poses, received_s, rospy.get_time())
         except ValueError as error:
             self._warn_dropped(str(error))
-
-    def _warn_rejected(self, reason: str) -> None:
-        self._warnings.warn(rejection(self._robot, reason, self.intake))
+            return
+        if reason:
+            self._warnings.warn(rejection(self._robot, reason, self.intake))
 
 
 def rejection(robot: str, reason: str, intake: ScanIntake) -> str:
@@ -200,19 +166,6 @@ def rejection(robot: str, reason: str, intake: ScanIntake) -> str:
     period_s = intake.expected_period_s
     then = f"; hovering after {period_s:g} s without a valid scan" if period_s > 0.0 else ""
     return f"{robot}: scan rejected: {reason}{then}"
-
-
-def _checked_scan(message: Any) -> Scan:
-    """Convert a scan.
-
-    Raises:
-        ValueError: The scan cannot be used.
-    """
-    scan = scan_from_message(message)
-    problem = scan_problem(scan)
-    if problem:
-        raise ValueError(problem)
-    return scan
 
 
 def _cloud_points(message: Any) -> NDArray[np.float32]:
@@ -274,26 +227,16 @@ def topic_of(sink: Sink, names: Names) -> Tuple[str, str]:
     return names(sink.source.topic or sink.source.name), sink.source.data_type
 
 
-def connect(
-    robot: str,
-    costmaps: Sequence[LayeredCostmap],
-    filters: ScanFilters,
-    names: Names = own_node,
-    others: Sequence[Sink] = (),
-) -> List[Sensor]:
+def connect(host: NavigatorHost, names: Names, others: Sequence[Sink] = ()) -> List[Sensor]:
     """Subscribe to the topics of sources of obstacle layers, to each topic once.
 
     Args:
-        robot: Name with which log lines begin.
-        costmaps: The global costmap and the local one.
-        filters: The robot's filters of scans.
+        host: Gets their messages.
         names: Resolves the names of topics.
         others: Sources that get their messages in another way.
     """
     takers: Dict[Tuple[str, str], List[Sink]] = {}
-    for sink in sinks_of(costmaps):
-        if sink in others:
-            continue
-        takers.setdefault(topic_of(sink, names), []).append(sink)
-    local_frame = costmaps[1].params.global_frame
-    return [Sensor(robot, *key, those, filters, local_frame) for key, those in takers.items()]
+    for sink in sinks_of(host.costmaps):
+        if sink not in others:
+            takers.setdefault(topic_of(sink, names), []).append(sink)
+    return [Sensor(host, *key, sinks) for key, sinks in takers.items()]

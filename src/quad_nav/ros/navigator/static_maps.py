@@ -17,7 +17,7 @@ from quad_nav.geometry import Pose3D
 from quad_nav.grid import GridSpec
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
-from quad_nav.topics.publishing import Names, own_node
+from quad_nav.topics.publishing import Names
 from quad_nav.topics.validation import grid_problem
 
 
@@ -30,17 +30,9 @@ class MapListener:
         name: str,
         layer: StaticLayer,
         lock: threading.RLock,
-        names: Names = own_node,
+        names: Names,
     ) -> None:
-        """Subscribe to the map.
-
-        Args:
-            costmap: Costmap of the layer.
-            name: Name of the layer.
-            layer: The static layer.
-            lock: Guards the costmap.
-            names: Names of the robot's topics.
-        """
+        """Subscribe to the map of layer ``name``; ``lock`` guards the costmap."""
         self._costmap = costmap
         self._name = name
         self._layer = layer
@@ -96,7 +88,7 @@ class MapListener:
 
 
 def connect(
-    costmaps: Sequence[LayeredCostmap], lock: threading.RLock, names: Names = own_node
+    costmaps: Sequence[LayeredCostmap], lock: threading.RLock, names: Names
 ) -> List[MapListener]:
     """Subscribe to the map topic of every static layer."""
     return [
@@ -105,15 +97,6 @@ def connect(
         for name, layer in costmap.layers.items()
         if isinstance(layer, StaticLayer)
     ]
-
-
-def place_maps(
-    robot: str, costmap: LayeredCostmap, transforms: Transforms, warnings: ThrottledWarnings
-) -> None:
-    """Give a costmap the poses of its frame in those of its maps; see `map_poses`."""
-    poses = map_poses(robot, costmap, transforms, warnings)
-    if poses:
-        costmap.set_map_poses(poses)
 
 
 def map_poses(

@@ -14,6 +14,7 @@ from quad_nav.errors import excerpt
 from quad_nav.files.values import is_number
 from quad_nav.geometry import Twist2D
 from quad_nav.ros.common.conversions import twist_from_message
+from quad_nav.ros.common.rospy_repairs import sender_of
 from quad_nav.sim.simulation import Simulation
 from quad_nav.topics.validation import CommandLease, twist_problem
 
@@ -56,7 +57,7 @@ class Commands:
         ]
 
     def _store(self, robot: int, message: Twist) -> None:
-        node = message._connection_header.get("callerid", "")
+        node = sender_of(message)
         if node not in self._nodes:
             self._nodes.add(node)
             self._wait_for(node)
@@ -79,7 +80,7 @@ class Commands:
         """Pass on the commands that have come from topics."""
         while self._waiting:
             robot, message = self._waiting.popleft()
-            node = excerpt(message._connection_header.get("callerid", "an unnamed node"))
+            node = excerpt(sender_of(message) or "an unnamed node")
             self.give(robot, node, twist_from_message(message))
 
     def give(self, robot: int, node: str, twist: Twist2D) -> None:

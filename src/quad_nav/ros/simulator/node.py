@@ -38,8 +38,7 @@ from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.readiness import server_parameters, start_node
 from quad_nav.ros.common.rospy_repairs import refuse_second, set_time
 from quad_nav.ros.composed.fleet import ComposedFleet
-from quad_nav.ros.composed.group import is_handed_over
-from quad_nav.ros.composed.own_nodes import OwnNodes, ignore_publishers
+from quad_nav.ros.composed.own_nodes import OwnNodes, hear_others_only
 from quad_nav.ros.navigator.nodes import log_invalid, prepare
 from quad_nav.ros.navigator.reconfigure import ParameterServer, config_type
 from quad_nav.ros.simulator.commands import Commands
@@ -326,7 +325,7 @@ def main() -> int:
         0 after a shutdown, 2 if the parameters or the scene are not valid.
     """
     own = OwnNodes()
-    ignore_publishers(own, is_handed_over)
+    hear_others_only(own)
     refuse_second("simulator", is_simulator=True)
     try:
         start_node("simulator", hears_clock=False)
