@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import dataclass, replace
-from typing import Any, Dict, Iterator, List, Mapping, Tuple
+from typing import Any, Dict, Iterator, List, Mapping, Sequence, Tuple, TypeVar
 
 from quad_nav.config.configuration import tables_of
 from quad_nav.config.files import COSTMAPS, ParameterTree, below, set_value
@@ -13,6 +13,7 @@ from quad_nav.config.notes import join
 from quad_nav.config.reader import Table
 from quad_nav.config.recoveries import CLEAR, TABLES
 
+Row = TypeVar("Row", bound=Any)
 Trees = Mapping[str, Mapping[str, Any]]
 """Robot's name -> its tree of ``Configuration.to_tree``; an empty tree is unknown."""
 
@@ -107,6 +108,15 @@ def parameter_rows(trees: Trees) -> Tuple[ParameterRow, ...]:
         )
         for entry in difference_list(trees)
     ]
+    return tuple(with_common_costmaps(rows))
+
+
+def with_common_costmaps(rows: Sequence[Row]) -> List[Row]:
+    """Merge rows that both costmaps have into one whose path is ``*_costmap/...``.
+
+    Args:
+        rows: Instances of a frozen dataclass with a field ``path``.
+    """
     own, other = (f"{name}/" for name in COSTMAPS)
     common = []
     for row in rows:
@@ -116,7 +126,7 @@ def parameter_rows(trees: Trees) -> Tuple[ParameterRow, ...]:
             common.append(row)
         elif row.path.startswith(own):
             common.append(replace(row, path="*_costmap/" + rest))
-    return tuple(common)
+    return common
 
 
 def difference_list(trees: Trees) -> List[Dict[str, Any]]:

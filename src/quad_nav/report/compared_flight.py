@@ -8,7 +8,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from quad_nav.config.differences import difference_list, number_text
+from quad_nav.config.differences import difference_list, number_text, with_common_costmaps
 from quad_nav.recording.trace import FlightTrace, RobotTrace
 from quad_nav.report.flight_metrics import FlightMetrics, flight_metrics
 from quad_nav.report.plot import sample
@@ -16,7 +16,6 @@ from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Scene
 
 _LINES = 100  # robots of all flights for which paths are thinned out: many traces need much memory
-_COSTMAPS = ("global_costmap/", "local_costmap/")
 _UNKNOWN = "unknown"
 
 
@@ -59,7 +58,7 @@ class Variant:
 class DifferenceRow:
     """Row of the table of differences: a value for each variant."""
 
-    name: str
+    path: str
     values: Tuple[str, ...]
     default: str = ""
     unit: str = ""
@@ -153,7 +152,7 @@ def difference_rows(
         for name in dict.fromkeys(name for flight in firsts for name in flight.setting)
     ]
     entries = {entry["parameter"]: entry for flight in firsts for entry in flight.differences or ()}
-    rows += _with_common_costmaps(
+    rows += with_common_costmaps(
         [
             DifferenceRow(
                 path,
@@ -178,16 +177,3 @@ def _cell(flight: ComparedFlight, path: str, default: str) -> str:
         for entry in found
     ]
     return "; ".join(texts) or default
-
-
-def _with_common_costmaps(rows: Sequence[DifferenceRow]) -> List[DifferenceRow]:
-    """Merge rows that both costmaps have into one named ``*_costmap/...``."""
-    everything = set(rows)
-    merged: Dict[DifferenceRow, None] = {}
-    for row in rows:
-        own = next((costmap for costmap in _COSTMAPS if row.name.startswith(costmap)), "")
-        rest = row.name[len(own) :]
-        twins = {replace(row, name=costmap + rest) for costmap in _COSTMAPS}
-        common = bool(own) and everything.issuperset(twins)
-        merged[replace(row, name=f"*_costmap/{rest}") if common else row] = None
-    return list(merged)

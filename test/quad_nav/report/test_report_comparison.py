@@ -71,7 +71,7 @@ def test_values_and_the_best_of_completed_flights():
 
 def test_only_what_differs_is_in_the_table():
     rows = difference_rows(flights(), variants(flights()))
-    assert [(row.name, row.values, row.default) for row in rows] == [
+    assert [(row.path, row.values, row.default) for row in rows] == [
         ("largest jitter", ("0 m", "0 m", "0.1 m"), ""),
         ("controller_frequency", ("5", "10", "10"), "20"),
     ]
@@ -108,7 +108,7 @@ def test_values_of_single_robots_and_of_both_costmaps():
 
     two = [inflated(0.7, 0.7), inflated(0.7, 0.9)]
     (row,) = difference_rows(two, variants(two))
-    assert row.name == "*_costmap/wide/inflation_radius"
+    assert row.path == "*_costmap/wide/inflation_radius"
     assert row.values == ("0.7", "0.7 (quad0); 0.9 (quad1)")
 
 
