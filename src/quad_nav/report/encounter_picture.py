@@ -88,7 +88,8 @@ def _gap(trace: FlightTrace, tracks: Tracks, encounter: Encounter, now: int, nea
         return separation_text(encounter.separation_m)
     if encounter.other is None:
         return ""
-    both = tracks.positions_m[[encounter.robot, encounter.other], now]
+    places = tracks.positions_m[:, now]
+    both = places[encounter.robot], places[encounter.other]
     gap_m = float(separations_m(*both, trace.robot_radius_m))
     # Around a contact, hulls that overlap by millimetres touch.
     return separation_text(max(gap_m, 0.0) if encounter.separation_m == 0.0 else gap_m)

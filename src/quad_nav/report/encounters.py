@@ -71,7 +71,8 @@ def separation_text(separation_m: float) -> str:
 
 
 def _of_pair(trace: FlightTrace, tracks: Tracks, a: int, b: int, below_m: float) -> List[Encounter]:
-    separation_m = separations_m(*tracks.positions_m[[a, b]], trace.robot_radius_m)
+    places = tracks.positions_m[a], tracks.positions_m[b]
+    separation_m = separations_m(*places, trace.robot_radius_m)
     close = separation_m < below_m
     if not close.any():
         return []
