@@ -42,11 +42,6 @@ def read_messages(
 
     One chunk is in memory at a time. Unwanted messages are not decoded.
 
-    Args:
-        path: The recording.
-        wanted: Selects topics.
-        progress: Called before each message with the share of the recorded time that is read.
-
     Raises:
         InputError: The file is not a recording, is damaged or was not completed.
     """

@@ -79,11 +79,7 @@ def read_trace(path: Path) -> FlightTrace:
 
 
 def read_recording(path: Path, progress: Progress = no_progress) -> TraceReader:
-    """Read what the trace of a recorded flight is made of.
-
-    Args:
-        path: The recording.
-        progress: Called often with the share that is read.
+    """Read what a trace is made of; ``progress`` is told often which share is read.
 
     Raises:
         InputError: The file is not a recording, or is damaged.

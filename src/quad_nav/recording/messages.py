@@ -194,15 +194,7 @@ def odometry(
     frames: Tuple[str, str],
     stamp: int,
 ) -> Any:
-    """Build a ``nav_msgs/Odometry``.
-
-    Args:
-        odom_from_base: Pose of the body in the odometry frame.
-        linear_mps: Linear velocity in the body frame.
-        angular_radps: Angular velocity in the body frame.
-        frames: Names of the odometry frame and of the body frame.
-        stamp: Time in nanoseconds.
-    """
+    """Build a ``nav_msgs/Odometry``; velocities are in the body frame, the second of ``frames``."""
     twist = tuple(linear_mps), tuple(angular_radps)
     return message(
         "nav_msgs/Odometry",

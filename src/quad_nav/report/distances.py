@@ -112,13 +112,9 @@ def _gap_panel(
 def _touching(
     trace: FlightTrace, tracks: Tracks, gaps_m: NDArray[np.float64], robots: bool
 ) -> NDArray[np.float64]:
-    """Set the distances to 0 at contacts, and negative ones of robots with a contact.
+    """Set distances, shape (n, t), to 0 at contacts, and negative ones of robots with a contact.
 
-    Args:
-        trace: Trace of the flight.
-        tracks: Its tracks.
-        gaps_m: Distances, shape (n, t).
-        robots: Whether the distances, and the contacts, are those between robots.
+    ``robots`` tells whether they, and the contacts, are those between robots.
     """
     numbers = {robot.name: k for k, robot in enumerate(trace.robots)}
     gaps_m = gaps_m.copy()

@@ -47,13 +47,7 @@ def contact_hover(contact: Contact) -> Hover:
 def encounter_marks(
     marked: Sequence[Encounter], x: Sequence[float], y: Sequence[float]
 ) -> Tuple[Marks, ...]:
-    """Return letters at the places of encounters; nothing without encounters.
-
-    Args:
-        marked: The encounters; their letters are in this order.
-        x: Where the letters are; NaN for an encounter that is not shown.
-        y: See ``x``.
-    """
+    """Return letters, in the order of the encounters; NaN is the place of one that has none."""
     if not marked:
         return ()
     hovers = [

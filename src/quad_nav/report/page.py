@@ -87,14 +87,7 @@ def picture(name: str, alt: str, figure: Union[Figure, Callable[[], Figure]]) ->
 def render(
     template: str, sections: Sequence[Section], folder: Optional[Path] = None, **context: Any
 ) -> Page:
-    """Render a page from a template.
-
-    Args:
-        template: Name of the template.
-        sections: Sections of the page.
-        folder: Further folder with templates.
-        context: Variables of the template.
-    """
+    """Render a page from a template; ``folder`` is a further one with templates."""
     has_plots = any(section.plots for section in sections)
     scripts = plot_scripts() if has_plots else Scripts()
     html = html_of(template, folder, sections=sections, scripts=scripts, **context)

@@ -95,12 +95,7 @@ def flown_paths(trace: FlightTrace, tracks: Tracks, marked: Sequence[Encounter])
 
 
 def overlaid_paths(flights: Sequence[ComparedFlight], metrics: Sequence[FlightMetrics]) -> PathsMap:
-    """Return the paths of several flights over the scene of the first one.
-
-    Args:
-        flights: Flights with their paths.
-        metrics: Their metrics, with labels.
-    """
+    """Return the paths of several flights, with their metrics, over the scene of the first one."""
     parts: List[Union[FlownPath, Marks]] = []
     has_contacts = False
     for number, (flight, flown) in enumerate(zip(flights, metrics)):

@@ -20,13 +20,7 @@ _FEWEST_CORNERS, _MOST_OUTLINES = 6, 2000  # of circles; of all obstacles, in al
 
 
 def animation(trace: FlightTrace, tracks: Tracks, first: int) -> Tuple[List[Json], List[Json]]:
-    """Return frames of robots and moving obstacles, and the traces that move.
-
-    Args:
-        trace: The flight.
-        tracks: Its paths.
-        first: Number of the first of the traces in the plot.
-    """
+    """Return frames of robots and moving obstacles, and the traces that move, from ``first`` on."""
     flown = [k for k, robot in enumerate(trace.robots) if len(robot.times_s)]
     if not flown or len(tracks.times_s) < 2:
         return [], []

@@ -86,13 +86,7 @@ def paths_plot(content: PathsMap) -> Plot:
 def distance_plot(
     panels: Sequence[Panel], names: Sequence[str], contacts_s: Sequence[float]
 ) -> Plot:
-    """Draw panels over common times.
-
-    Args:
-        panels: The panels, from the top.
-        names: Names of the robots.
-        contacts_s: Times of contacts.
-    """
+    """Draw panels over common times, from the top; ``contacts_s`` are the times of contacts."""
     traces: List[Json] = []
     axes: Json = {"xaxis": axis("time (s)", anchor=f"y{len(panels)}" if len(panels) > 1 else "y")}
     shapes: List[Json] = []

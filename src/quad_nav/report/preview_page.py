@@ -20,13 +20,7 @@ _DIGITS = 3  # of coordinates in metres
 def page_data(
     preview: MissionPreview, robots: Sequence[RobotPreview], title: str
 ) -> Dict[str, Any]:
-    """Return everything that the page's script draws, ready for JSON.
-
-    Args:
-        preview: The mission.
-        robots: Its robots with goals.
-        title: Heading of the page.
-    """
+    """Return everything that the page's script draws of robots with goals, ready for JSON."""
     scene = preview.scene
     solids, passed = outlines(scene) if scene else ([], [])
     return {
@@ -49,11 +43,7 @@ def page_data(
 
 
 def preview_page(data: Mapping[str, Any]) -> str:
-    """Render the page.
-
-    Args:
-        data: Result of ``page_data``.
-    """
+    """Render the page from what ``page_data`` returns."""
     return html_of("preview.html.jinja", data=data)
 
 

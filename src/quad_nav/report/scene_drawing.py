@@ -75,13 +75,7 @@ def draw_moving(axes: Axes, trace: FlightTrace, time_s: float) -> List[Patch]:
 
 
 def draw_starting(axes: Axes, scene: Scene, moving: Sequence[Obstacle]) -> None:
-    """Draw the paths along keyframes, and moving obstacles where they start.
-
-    Args:
-        axes: Axes to draw in.
-        scene: Scene, whose moving obstacles have the keyframes.
-        moving: The obstacles and people where they start.
-    """
+    """Draw the paths along keyframes, and moving obstacles and people where they start."""
     for track in keyframe_paths(scene):
         axes.plot(track[:, 0], track[:, 1], color=MOVING, lw=1.0, alpha=0.35, zorder=2)
     for solid in moving:

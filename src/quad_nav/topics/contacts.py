@@ -16,11 +16,7 @@ def contact_fields(contact: Contact) -> Dict[str, Any]:
 
 
 def contact_from_message(message: Any, time_s: float) -> Contact:
-    """Read a ``quad/Contact``, of rospy or of a recording.
-
-    Args:
-        message: The message.
-        time_s: Its stamp.
+    """Read a ``quad/Contact`` with this stamp, of rospy or of a recording.
 
     Raises:
         ValueError: A field is out of its range.

@@ -65,13 +65,7 @@ class MissionEvent:
 
 
 def mission_event(robot: int, time_s: float, action: Action) -> MissionEvent:
-    """Return the event of an action.
-
-    Args:
-        robot: Number of the robot.
-        time_s: Time of the action.
-        action: The action.
-    """
+    """Return the event of a robot's action."""
     about = time_s, robot, action.event, action.level, action.text
     if isinstance(action, SendGoal):
         goal = action.index, action.lap, action.attempt, action.resend_reason
@@ -85,11 +79,7 @@ def mission_event(robot: int, time_s: float, action: Action) -> MissionEvent:
 
 
 def mission_event_from_message(message: Any, time_s: float) -> MissionEvent:
-    """Read a ``quad/MissionEvent``, of rospy or of a recording.
-
-    Args:
-        message: The message.
-        time_s: Its stamp.
+    """Read a ``quad/MissionEvent`` with this stamp, of rospy or of a recording.
 
     Raises:
         ValueError: A field is not valid.

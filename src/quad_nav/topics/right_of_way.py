@@ -66,12 +66,7 @@ class RightOfWay:
 
 
 def right_of_way(yielding: Optional[YieldDecision], limited_by: str) -> RightOfWay:
-    """Return the right of way of a robot.
-
-    Args:
-        yielding: Its decision to yield; None without one.
-        limited_by: Name of the robot that limits its command, "" if none does.
-    """
+    """Return the right of way of a robot by its decision and the peer that limits its command."""
     if yielding is None:
         if not limited_by:
             return RightOfWay()

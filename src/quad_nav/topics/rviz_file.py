@@ -31,12 +31,7 @@ EXIT_BAD_INPUT = 2
 
 
 def document(robots: int, scene: Scene) -> Dict[str, Any]:
-    """Return the content of a .rviz file.
-
-    Args:
-        robots: Number of quadcopters, numbered from 0.
-        scene: Sets the grid and the view.
-    """
+    """Return the content of a .rviz file; the scene sets the grid and the view."""
     template = yaml.safe_load(shipped("rviz", "quad_multi.rviz").read_text(encoding="utf-8"))
     manager = template["Visualization Manager"]
     displays = manager["Displays"]

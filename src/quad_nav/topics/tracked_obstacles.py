@@ -180,9 +180,6 @@ def obstacle_fields(tracks: Tracks) -> Mapping[str, List[Dict[str, Any]]]:
 def track_rows(tracks: Tracks) -> NDArray[np.float64]:
     """Return tracks and suspects as one table.
 
-    Args:
-        tracks: The tracks and suspects.
-
     Returns:
         float64[k, 6], columns x and y (m), their velocities (m/s), radius (m) and ``TrackKind``.
     """
