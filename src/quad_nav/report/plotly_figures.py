@@ -158,7 +158,7 @@ def _scene_traces(scene: Optional[Scene]) -> List[Json]:
             continue
         gap = np.full((1, 2), np.nan)
         points = np.concatenate([part for shape in shapes for part in (shape, gap)])[:-1]
-        more = {"fill": "toself", "name": name, "hoverinfo": "skip", **style}
+        more: Json = {"fill": "toself", "name": name, "hoverinfo": "skip", **style}
         found.append(lines(*points.T, **more))
     return found
 
