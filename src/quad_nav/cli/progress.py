@@ -25,7 +25,7 @@ _STARTING = "starting (the first flight after an installation compiles kernels f
 
 
 def flights_progress(quiet: bool) -> Progress:
-    """Create a bar for many flights, with the time left.
+    """Create a bar for many flights.
 
     A task has a description, and a field ``status`` with text behind the count, which ends with the
     time left; rich's own estimate counts flights that were stored earlier as fast. Start the bar
