@@ -9,7 +9,6 @@ from quad_nav.files.values import (
     Rule,
     choice,
     is_number,
-    is_whole,
     number,
     optional_text,
     text,
@@ -114,14 +113,9 @@ RULES: Dict[str, Rule] = {
 }
 
 
-def optional(rule: Rule) -> Rule:
-    """The same rule, which also accepts an empty text."""
-    return Rule(lambda value: value == "" or rule.accepts(value), f"{rule.expected}, or nothing")
-
-
-def optional_whole(rule: Rule) -> Rule:
-    """The same rule for a whole number, which also accepts 0."""
+def optional(rule: Rule, nothing: Any = "") -> Rule:
+    """The same rule, which also accepts a value that stands for nothing."""
     return Rule(
-        lambda value: (is_whole(value) and value == 0) or rule.accepts(value),
-        f"{rule.expected}, or 0",
+        lambda value: (value == nothing and type(value) is type(nothing)) or rule.accepts(value),
+        f"{rule.expected}, or {str(nothing) or 'nothing'}",
     )

@@ -221,6 +221,24 @@ def read_configurations(
     return configurations
 
 
+def loaded_configurations(trees: Mapping[int, Any]) -> Dict[int, Configuration]:
+    """Return the configurations of the nodes ``move_base{i}`` by their trees on the server.
+
+    Raises:
+        InputError: Every fault in any of them.
+    """
+    found: Dict[int, Configuration] = {}
+    problems: List[str] = []
+    for number, tree in trees.items():
+        try:
+            found[number] = config.load(tree, f"/move_base{number}")
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    return found
+
+
 def _read_configuration(source: RobotSource, area: Optional[Bounds]) -> Configuration:
     """Read a robot's parameters, with a global costmap that covers an area."""
     tree = robot_tree(source)
