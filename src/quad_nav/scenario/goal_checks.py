@@ -102,33 +102,18 @@ def with_planner_tolerance(
     return replace(settings, yaw_tolerance_rad=planners_rad)
 
 
-def tolerance_warnings(
+def file_warnings(
     robots: Sequence[RobotGoals], configurations: Sequence[Optional[Configuration]]
 ) -> List[str]:
-    """A warning for each goal file whose tolerances the local planner may not reach.
-
-    It is no fault: the robot usually stops nearer than the planner's tolerance demands.
-    """
-    warnings = []
-    for robot, configuration in zip(robots, configurations):
-        planner = configuration.local_planner if configuration else None
-        sequence = robot.sequence
-        near_m = min(map(sequence.tolerance_m, sequence.goals))
-        turned = [goal for goal in sequence.goals if goal.yaw_rad is not None]
-        near_rad = min(map(sequence.yaw_tolerance_rad, turned), default=math.inf)
-        for value, unit, name, field in (
-            (near_m, "m", "xy_goal_tolerance", "xy_goal_tolerance_m"),
-            (near_rad, "rad", "yaw_goal_tolerance", _YAW_FIELD),
-        ):
-            planners = getattr(planner, field, 0.0)
-            if value < planners:
-                warnings.append(
-                    f"{robot.file.path}: a tolerance of {value:g} {unit} is below the local "
-                    f"planner's {name}, {planners:g} {unit}: the quadcopter may stop outside, and "
-                    f"the goal would be skipped; expected {planners:g} {unit} or more, or a "
-                    f"smaller {name}"
-                )
-    return warnings
+    """The warnings of each goal file, with its name."""
+    planners = [one.local_planner if one else None for one in configurations]
+    return [
+        f"{robot.file.path}: {line}"
+        for robot, planner in zip(robots, planners)
+        for line in robot.sequence.warnings(
+            getattr(planner, "xy_goal_tolerance_m", 0.0), getattr(planner, _YAW_FIELD, 0.0)
+        )
+    ]
 
 
 def coverage_notes(configurations: Sequence[Optional[Configuration]]) -> List[str]:

@@ -30,9 +30,9 @@ from quad_nav.scenario.goal_checks import (
     OFF_COSTMAP,
     cover_warnings,
     coverage_notes,
+    file_warnings,
     goals_off_the_costmap,
     place_check,
-    tolerance_warnings,
     with_planner_tolerance,
 )
 from quad_nav.scenario.random_mission import RandomMission, random_mission
@@ -129,7 +129,7 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
         faults += small
     warnings = (
         *last_goal_conflicts(robots, request.robot_radius),
-        *tolerance_warnings(robots, configurations),
+        *file_warnings(robots, configurations),
         *small,
     )
     notes = tuple(coverage_notes(configurations))
