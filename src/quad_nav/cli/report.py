@@ -92,13 +92,8 @@ def _read(
 ) -> List[T]:
     """Read each flight and reduce its trace at once: many whole traces do not fit in memory.
 
-    Args:
-        flights: Recordings.
-        reduce: Function of a trace whose results are returned.
-        faults: Faults found before; they are reported together with those of the flights.
-
     Raises:
-        InputError: Lists ``faults`` and every flight that cannot be read.
+        InputError: Lists ``faults``, found before, and every flight that cannot be read.
     """
     from quad_nav.recording.bag_trace import read_trace
 

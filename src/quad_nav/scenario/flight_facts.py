@@ -28,13 +28,7 @@ SHIPPED = "shipped"
 def offline_facts(
     options: FlightOptions, setup: FlightSetup, command: Sequence[str] = ()
 ) -> Dict[str, Any]:
-    """Return the facts of an offline flight.
-
-    Args:
-        options: Options of the flight.
-        setup: What ``read_setup`` made of them.
-        command: Command line of the program.
-    """
+    """Return the facts of an offline flight; ``read_setup`` made the setup of the options."""
     simulation = setup.simulation
     trees = {
         robot.name: configuration.to_tree()

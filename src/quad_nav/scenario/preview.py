@@ -128,12 +128,7 @@ class MissionPreview:
         return place_check(self.scene, self.robot_radius_m, self._configurations.get(number))
 
     def robot(self, number: int, sequence: Optional[GoalSequence] = None) -> RobotPreview:
-        """Check and plan a robot's goals.
-
-        Args:
-            number: The robot's number.
-            sequence: Its goals; None for those of its file.
-        """
+        """Check and plan a robot's goals, those of its file unless others are given."""
         sequence = sequence or self._sequences[number]
         check = self.check(number)
         faults = tuple(check(goal.x_m, goal.y_m) or "" for goal in sequence.goals)

@@ -141,9 +141,7 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
 def body_radius_m(configurations: Sequence[Optional[Configuration]], own_m: float) -> float:
     """Return the radius of the simulated bodies, the largest that the configurations ask for.
 
-    Args:
-        configurations: Those of all robots.
-        own_m: Radius of a quadcopter without ``body_radius``.
+    ``own_m`` is that of a quadcopter without ``body_radius``.
     """
     radii = [one.body_radius_m if one else None for one in configurations]
     return max((own_m if one is None else one for one in radii), default=own_m)

@@ -162,10 +162,6 @@ def asked_for_by_navigators(all_parameters: Mapping[str, Any], robots: Any) -> D
     """Return parameters of the simulator that follow from those of navigators on the server.
 
     Navigators with faults are left out; they name their faults themselves.
-
-    Args:
-        all_parameters: The whole parameter tree, with those of ``move_base{i}``.
-        robots: Number of robots.
     """
     configurations: List[Optional[Configuration]] = []
     for number in range(robots if is_whole(robots) else 0):
