@@ -13,8 +13,8 @@ from typing import Any, Dict, Mapping, Optional, Sequence
 from quad_nav.config.differences import Trees, difference_list
 from quad_nav.files.shipped import shipped
 from quad_nav.files.values import is_number
+from quad_nav.scenario import RANDOM
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup
-from quad_nav.scenario.rules import RANDOM
 from quad_nav.scenario.simulator_setup import DEFAULT_BEAMS
 from quad_nav.scenario.simulator_setup import DEFAULTS as SIMULATOR_DEFAULTS
 from quad_nav.sim.flight import airframe_name

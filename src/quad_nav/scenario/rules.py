@@ -14,12 +14,11 @@ from quad_nav.files.values import (
     text,
     whole,
 )
+from quad_nav.scenario import RANDOM
 from quad_nav.sim.flight import AIRFRAMES
 from quad_nav.sim.odometry import MAX_DRIFT
 from quad_nav.sim.simulation_params import LIDAR_CASTERS, STEPS_PER_S
 
-RANDOM = "random"
-"""Value of ``scene`` and ``goals`` that asks for a random mission."""
 START_S = 1.0
 """Time on `/clock` when a simulation starts: rospy treats 0 as a clock without messages."""
 MAX_SIZE_M = 250  # a larger random arena takes minutes to fill with obstacles

@@ -25,6 +25,7 @@ from quad_nav.mission.robot_goals import (
     last_goal_conflicts,
     load_robot_goals,
 )
+from quad_nav.scenario import RANDOM
 from quad_nav.scenario.coverage import Bounds, cover_area, scene_bounds
 from quad_nav.scenario.goal_checks import (
     OFF_COSTMAP,
@@ -36,7 +37,7 @@ from quad_nav.scenario.goal_checks import (
     with_planner_tolerance,
 )
 from quad_nav.scenario.random_mission import RandomMission, random_mission
-from quad_nav.scenario.rules import RANDOM, RULES, optional
+from quad_nav.scenario.rules import RULES, optional
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.scene_file import load_scene
 
