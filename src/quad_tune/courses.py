@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Dict, List, Mapping, Optional, Sequence, Tuple
 from quad_nav.config.sources import source_paths
 from quad_nav.errors import InputError
 from quad_nav.mission.robot_goals import WatchedGoalFile
+from quad_nav.scenario import RANDOM
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.sim.simulation_params import SimulationParams
 from quad_tune.flight_result import FlightResult
@@ -19,7 +20,6 @@ from quad_tune.space import Assignments, costmap_paths
 
 HELD_OUT_SEED = 1_000_000
 """Offset of the seeds of held-out flights."""
-RANDOM = "random"
 LIDAR = "lidar"
 _LIDAR_FIELDS = {"range": "range_max_m", "noise": "noise_std_m"}
 

@@ -36,19 +36,7 @@ LAYERS = [
     {"cli"},
 ]
 # Navigation and the simulator do not import each other.
-WORLD_USERS = {
-    "sim",
-    "mission",
-    "scenario",
-    "topics",
-    "loop",
-    "offline",
-    "recording",
-    "report",
-    "cli",
-    "ros",
-    "api",
-}
+WORLD_USERS = set("sim mission scenario topics loop offline recording report cli ros api".split())
 # (importing module, imported add-on): an add-on imports another one in these modules alone.
 BETWEEN_ADD_ONS = {("quad_tune/barn_course.py", "quad_bench")}
 

@@ -59,7 +59,7 @@ def fly_mission(
         page = _page(served) if web else None
     while True:
         with exit_on_faults():
-            drawn = FlightPictures(setup, report, pictures, animate)
+            drawn = FlightPictures(setup, outputs)
             observers = _observers(record)
             if not quiet:
                 show_warnings(setup.warnings)
@@ -153,11 +153,11 @@ def _fly(
         for line in filter(None, (observer.stop_reason for observer in observers)):
             echo(line, err=True)
     outputs.write("--json", json.dumps(to_json(summary), indent=2, allow_nan=False))
-    for line in pictures.write(summary, outputs, overview if quiet else ""):
+    for line in pictures.write(summary, overview if quiet else ""):
         if not quiet:
             echo(line, err=True)
     if not any(observer.stop_reason for observer in observers):
-        outputs.announce_files("--record")
+        outputs.announce_file("--record")
     if summary.reason == INTERRUPTED:
         return EXIT_INTERRUPTED
     return outputs.exit_status(summary.exit_status)

@@ -15,8 +15,9 @@ from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
 from quad_nav.files.values import value_faults
 from quad_nav.mission.robot_goals import RobotGoals
+from quad_nav.scenario import RANDOM
 from quad_nav.scenario.coverage import scene_bounds
-from quad_nav.scenario.rules import RANDOM, RULES, steps_per_scan
+from quad_nav.scenario.rules import RULES, steps_per_scan
 from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configurations, read_scenario
 from quad_nav.scenario.scene_map import scene_map_problem
 from quad_nav.sim.scene import Scene

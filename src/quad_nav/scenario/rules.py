@@ -9,18 +9,16 @@ from quad_nav.files.values import (
     Rule,
     choice,
     is_number,
-    is_whole,
     number,
     optional_text,
     text,
     whole,
 )
+from quad_nav.scenario import RANDOM
 from quad_nav.sim.flight import AIRFRAMES
 from quad_nav.sim.odometry import MAX_DRIFT
 from quad_nav.sim.simulation_params import LIDAR_CASTERS, STEPS_PER_S
 
-RANDOM = "random"
-"""Value of ``scene`` and ``goals`` that asks for a random mission."""
 START_S = 1.0
 """Time on `/clock` when a simulation starts: rospy treats 0 as a clock without messages."""
 MAX_SIZE_M = 250  # a larger random arena takes minutes to fill with obstacles
@@ -114,14 +112,9 @@ RULES: Dict[str, Rule] = {
 }
 
 
-def optional(rule: Rule) -> Rule:
-    """The same rule, which also accepts an empty text."""
-    return Rule(lambda value: value == "" or rule.accepts(value), f"{rule.expected}, or nothing")
-
-
-def optional_whole(rule: Rule) -> Rule:
-    """The same rule for a whole number, which also accepts 0."""
+def optional(rule: Rule, nothing: Any = "") -> Rule:
+    """The same rule, which also accepts a value that stands for nothing."""
     return Rule(
-        lambda value: (is_whole(value) and value == 0) or rule.accepts(value),
-        f"{rule.expected}, or 0",
+        lambda value: (value == nothing and type(value) is type(nothing)) or rule.accepts(value),
+        f"{rule.expected}, or {str(nothing) or 'nothing'}",
     )

@@ -25,18 +25,19 @@ from quad_nav.mission.robot_goals import (
     last_goal_conflicts,
     load_robot_goals,
 )
+from quad_nav.scenario import RANDOM
 from quad_nav.scenario.coverage import Bounds, cover_area, scene_bounds
 from quad_nav.scenario.goal_checks import (
     OFF_COSTMAP,
     cover_warnings,
     coverage_notes,
+    file_warnings,
     goals_off_the_costmap,
     place_check,
-    tolerance_warnings,
     with_planner_tolerance,
 )
 from quad_nav.scenario.random_mission import RandomMission, random_mission
-from quad_nav.scenario.rules import RANDOM, RULES, optional
+from quad_nav.scenario.rules import RULES, optional
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.scene_file import load_scene
 
@@ -129,7 +130,7 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
         faults += small
     warnings = (
         *last_goal_conflicts(robots, request.robot_radius),
-        *tolerance_warnings(robots, configurations),
+        *file_warnings(robots, configurations),
         *small,
     )
     notes = tuple(coverage_notes(configurations))
@@ -141,9 +142,7 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
 def body_radius_m(configurations: Sequence[Optional[Configuration]], own_m: float) -> float:
     """Return the radius of the simulated bodies, the largest that the configurations ask for.
 
-    Args:
-        configurations: Those of all robots.
-        own_m: Radius of a quadcopter without ``body_radius``.
+    ``own_m`` is that of a quadcopter without ``body_radius``.
     """
     radii = [one.body_radius_m if one else None for one in configurations]
     return max((own_m if one is None else one for one in radii), default=own_m)
