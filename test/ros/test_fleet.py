@@ -9,8 +9,6 @@ import rostest
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from flight_case import PATIENCE_S, FlightCase, Latest
 from geometry_msgs.msg import PoseStamped
-from move_base_msgs.msg import MoveBaseActionFeedback
-from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetPlan
 from test_ros_topics import SERVICES, absent, names_of
 
@@ -67,16 +65,6 @@ class Fleet(FlightCase):
         self.assertEqual(client.update_configuration({"sim_time": 1.2})["sim_time"], 1.2)
         self.assertEqual(rospy.get_param("/move_base2/TrajectoryPlannerROS/sim_time"), 1.2)
         self.assertNotEqual(rospy.get_param("/move_base1/TrajectoryPlannerROS/sim_time"), 1.2)
-
-    def test_5_topics_say_what_they_are_about(self):
-        grid = rospy.wait_for_message(
-            "/move_base3/global_costmap/costmap", OccupancyGrid, PATIENCE_S
-        )
-        self.assertEqual(grid.header.frame_id, "map")
-        feedback = rospy.wait_for_message(
-            "/move_base3/feedback", MoveBaseActionFeedback, PATIENCE_S
-        )
-        self.assertEqual(feedback.feedback.base_position.header.frame_id, "map")
 
     def test_9_every_goal_is_reached(self):
         result = self.read_result(rospy.get_param("~result"), patience_s=350.0)
