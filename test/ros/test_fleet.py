@@ -10,7 +10,7 @@ from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from flight_case import PATIENCE_S, FlightCase, Latest
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.srv import GetPlan
-from test_ros_topics import SERVICES, absent, names_of
+from test_ros_topics import absent, services
 
 from quad_nav.scenario.random_mission import random_mission
 
@@ -27,7 +27,7 @@ class Fleet(FlightCase):
     def test_1_every_robot_has_all_topics_and_services(self):
         self.wait(lambda: not absent(range(ROBOTS)), "every topic, subscription and service")
         for i in range(ROBOTS):
-            for name, kind in names_of(SERVICES, i).items():
+            for name, kind in services(i).items():
                 self.assertEqual(rosservice.get_service_type(name), kind, name)
 
     def test_2_a_flying_robot_makes_no_plans_for_others(self):
