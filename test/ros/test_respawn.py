@@ -73,13 +73,13 @@ class Respawn(FlightCase):
 
     def the_rate_changes(self):
         client = Client("/simulator", timeout=PATIENCE_S)
-        self.assertEqual(client.update_configuration({"rate": 4.0})["rate"], 4.0)
-        self.wait(lambda: self.value("simulator: clock", "rate") == "4", "the rate")
-        self.assertEqual(rospy.get_param("/simulator/rate"), 4.0)
+        self.assertEqual(client.update_configuration({"rate": 3.0})["rate"], 3.0)
+        self.wait(lambda: self.value("simulator: clock", "rate") == "3", "the rate")
+        self.assertEqual(rospy.get_param("/simulator/rate"), 3.0)
         for wrong in (float("nan"), -1.0):
             client.update_configuration({"rate": wrong})
             self.assertGreater(client.get_configuration()["rate"], 0.0)
-        client.update_configuration({"rate": 4.0})
+        client.update_configuration({"rate": 3.0})
 
     def it_stays_stopped_over_the_death_of_the_sequencer(self):
         self.assertIn("/mission/resume", trigger("/mission/stop"))
