@@ -37,7 +37,6 @@ from quad_tune.cli.tune import tune
 from quad_tune.courses import HELD_OUT_SEED, Case, Mission, MissionCourse, check_missions
 from quad_tune.evaluation import task_of
 from quad_tune.flight_result import FlightTask, fly_task
-from quad_tune.report.outcome_pictures import front
 from quad_tune.sweep import read_points
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -176,15 +175,6 @@ def test_a_flight_through_barn_counts_as_the_benchmark_counts_it(tmp_path):
     assert touched["metric"] == late["metric"] == 0.0
 
 
-def test_the_front_holds_what_nothing_beats_in_both():
-    assert front([(3.0, 0.3), (1.0, 0.1), (2.0, 0.05), (4.0, 0.3), (2.5, 0.2), (1.0, 0.05)]) == [
-        (1.0, 0.1),
-        (2.5, 0.2),
-        (3.0, 0.3),
-    ]
-    assert front([]) == []
-
-
 def tune_arguments(folder):
     """A study of two candidates that flies in a few seconds."""
     mission = write_mission(folder)
@@ -232,8 +222,8 @@ def test_tune_from_the_command_line_and_again(tmp_path):
     assert written["TrajectoryPlannerROS"]["vtheta_samples"] == 8  # the value of --set
     assert "quad" in (tmp_path / "out" / "config" / "STUDY.md").read_text()
     page = (tmp_path / "out" / "report.html").read_text()
-    assert page.count("data:image/png;base64,") >= 5
-    for name in ("held_out", "history", "pareto"):
+    assert page.count("data:image/png;base64,") >= 4
+    for name in ("held_out", "history", "pareto", "slices"):
         assert f'id="figure-plot-{name}"' in page
         assert (tmp_path / "pictures" / f"{name}.svg").exists()
     assert "Not distinguishable from chance with 1 flight" in page or "Base kept" in page

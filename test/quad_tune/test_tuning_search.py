@@ -27,7 +27,7 @@ from quad_tune.flight_cache import FlightCache
 from quad_tune.flight_result import FlightResult
 from quad_tune.proposals import propose, should_prune
 from quad_tune.refinement import refine
-from quad_tune.report.search_pictures import importances
+from quad_tune.report.tune_plots import importances
 from quad_tune.search import SearchOptions, best_first, rounds, search
 from quad_tune.study import json_differences, open_study
 from quad_tune.study_text import gain_text

@@ -143,7 +143,7 @@ class Results:
 
     def _run_row(self, run: Any) -> Dict[str, Any]:
         """Return a run's values by the names of their columns."""
-        row = {
+        row: Dict[str, Any] = {
             name: rounded(value) if isinstance(value, float) else value
             for name, value in asdict(run).items()
         }

@@ -193,8 +193,8 @@ def _rounded(values: Dict[str, Any]) -> Dict[str, Any]:
 
 
 def _run_row(run: CircleRun) -> Dict[str, Any]:
-    names = ("robots", "radius_m", "method", "run", "seed", "succeeded", "arrived", "contacts")
-    names += ("mean_arrival_s", "last_arrival_s", "detour", "gap_m", "sim_time_s")
+    names = ["robots", "radius_m", "method", "run", "seed", "succeeded", "arrived", "contacts"]
+    names += ["mean_arrival_s", "last_arrival_s", "detour", "gap_m", "sim_time_s"]
     values = {name: getattr(run, name) for name in names}
     return _rounded({**values, "contacts": len(run.contacts)})
 
