@@ -97,17 +97,12 @@ def run_script(folder, text):
     return run(folder, sys.executable, script)
 
 
-def test_the_files_run_where_a_program_is_started_with_minus_m(tmp_path):
-    (tmp_path / "yaml.py").write_text("print('ran')")
-    assert "ran" in run(tmp_path, sys.executable, "-m", "yaml")
-
-
 def test_workers_of_a_study(mission):
     expected = [(0, ("a", str(mission), "1")), (1, ("b", str(mission), "1"))]
     assert run_script(mission, STUDY) == f"{expected}\nFalse\n"
 
 
-@pytest.mark.parametrize("method", ["spawn", "forkserver", "fork"])
+@pytest.mark.parametrize("method", ["spawn", "forkserver"])
 def test_navigators_in_other_processes(mission, method):
     text = NAVIGATORS.format(method=method, goals=str(ROOT / "goals"))
     assert run_script(mission, text) == f"{mission}\n"
