@@ -12,7 +12,7 @@ rospy = pytest.importorskip("rospy")
 
 from quad_nav.costmap.tracks import Tracks  # noqa: E402
 from quad_nav.geometry import Pose3D, quaternion_from_yaw  # noqa: E402
-from quad_nav.ros.common.conversions import marker_array, replacing_markers  # noqa: E402
+from quad_nav.ros.common.marker_messages import marker_array, replacing_markers  # noqa: E402
 from quad_nav.sim.motion import Motion, Walkers  # noqa: E402
 from quad_nav.sim.movers import Movers  # noqa: E402
 from quad_nav.sim.scene import Box, MovingObstacle, Scene, Walls  # noqa: E402

@@ -21,7 +21,7 @@ from websockets.sync.client import connect
 
 from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D
-from quad_nav.ros.common.conversions import marker_array
+from quad_nav.ros.common.marker_messages import marker_array
 from quad_nav.topics.right_of_way import Kind, RightOfWay
 from quad_nav.topics.tracked_obstacles import track_markers
 from quad_web.ros.actions import FlightActions

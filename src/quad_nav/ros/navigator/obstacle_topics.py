@@ -8,7 +8,8 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.costmap.scan_filter import ScanFilters
-from quad_nav.ros.common.conversions import replacing_markers, time_message
+from quad_nav.ros.common.conversions import time_message
+from quad_nav.ros.common.marker_messages import replacing_markers
 from quad_nav.topics.publishing import Names
 from quad_nav.topics.tracked_obstacles import (
     MARKERS_TOPIC,
