@@ -23,8 +23,8 @@ from quad_nav.mission.checkpoint import MissionCheckpoint
 from quad_nav.mission.flight_log import FlightLog
 from quad_nav.mission.summary import MissionSummary, summarize
 from quad_nav.ros.common import readiness
-from quad_nav.ros.common.conversions import replacing_markers
 from quad_nav.ros.common.diagnostics import DiagnosticsTopic, ThrottledWarnings
+from quad_nav.ros.common.marker_messages import replacing_markers
 from quad_nav.ros.common.own_messages import flight_info_message
 from quad_nav.ros.common.readiness import Need
 from quad_nav.ros.common.transforms import TransformUnavailable
