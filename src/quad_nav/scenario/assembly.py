@@ -14,7 +14,6 @@ from quad_nav.config.plugins import Plugin
 from quad_nav.config.recoveries import RecoveryParams
 from quad_nav.control.controller import LocalPlanner
 from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
-from quad_nav.control.rollout import footprint_cost
 from quad_nav.control.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layer import LayerParams
@@ -24,7 +23,6 @@ from quad_nav.costmap.peer_layer import PeerLayerParams
 from quad_nav.costmap.scan_filter import ScanFilter, ScanFilters
 from quad_nav.costmap.scan_intake import ScanIntake
 from quad_nav.costmap.scan_validator import ScanValidator
-from quad_nav.geometry import Pose2D
 from quad_nav.navigator.command_filter import CommandFilter, VoronoiCell
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
@@ -213,8 +211,4 @@ def build_recovery(params: RecoveryParams) -> Recovery:
         return ClearCostmap(params)
     if isinstance(params, MoveSlowAndClearParams):
         return MoveSlowAndClear(params)
-    return Rotate(params, _footprint_cost)
-
-
-def _footprint_cost(costmap: LayeredCostmap, pose: Pose2D) -> float:
-    return footprint_cost(costmap.spec, costmap.costs, costmap.footprint, pose)
+    return Rotate(params)
