@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Iterable, Optional, Tuple
 
+from quad_nav.costmap.cost_grid import Square
 from quad_nav.costmap.layer import Redraw
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.parameter import deviation, fixed_flag, fixed_number, fixed_text
@@ -70,13 +71,9 @@ class ClearCostmap:
             if pose is None:
                 skipped.append(name)
                 continue
+            square = Square(pose.x_m, pose.y_m, params.reset_distance_m)
             costmap.clear_area(
-                self._names(costmap),
-                pose.x_m,
-                pose.y_m,
-                params.reset_distance_m,
-                keep_inside=not params.invert_area_to_clear,
-                redraw=redraw,
+                self._names(costmap), square, not params.invert_area_to_clear, redraw
             )
             if params.force_updating:
                 costmap.update(context.now_s, pose)

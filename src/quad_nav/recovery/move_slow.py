@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import List, Tuple
 
+from quad_nav.costmap.cost_grid import Square
 from quad_nav.costmap.layer import Redraw
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.parameter import POSITIVE, deviation, fixed_number, fixed_text
@@ -110,7 +111,9 @@ class MoveSlowAndClear:
             if pose is None:
                 messages.append(f"{name} costmap not cleared: robot pose unknown")
             elif not costmap.free_layers(
-                self._names(costmap), pose.x_m, pose.y_m, 2.0 * params.clearing_distance_m, redraw
+                self._names(costmap),
+                Square(pose.x_m, pose.y_m, 2.0 * params.clearing_distance_m),
+                redraw,
             ):
                 messages.append(
                     f"{name} costmap not cleared: it has no obstacle layer or"

@@ -13,7 +13,6 @@ from quad_nav.config.plugins import Plugin
 from quad_nav.config.recoveries import RecoveryParams
 from quad_nav.control.controller import LocalPlanner
 from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
-from quad_nav.control.rollout import footprint_cost
 from quad_nav.control.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layer import LayerParams
@@ -22,7 +21,6 @@ from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.peer_layer import PeerLayerParams
 from quad_nav.costmap.scan_filter import ScanFilters
 from quad_nav.costmap.scan_validator import ScanValidator
-from quad_nav.geometry import Pose2D
 from quad_nav.navigator.command_filter import VoronoiCell
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
@@ -55,7 +53,7 @@ LOCAL_PLANNERS: Dict[type, Callable[[Any, NDArray[np.float64], float], LocalPlan
 _RECOVERIES: Dict[type, Callable[[Any], Recovery]] = {
     ClearCostmapParams: ClearCostmap,
     MoveSlowAndClearParams: MoveSlowAndClear,
-    RotateParams: lambda params: Rotate(params, _footprint_cost),
+    RotateParams: Rotate,
 }
 _PEER_LAYER = ("peer_layer", PeerLayerParams())
 
@@ -174,7 +172,3 @@ def build_recovery(params: RecoveryParams) -> Recovery:
     """Build a recovery behaviour."""
     recovery: Recovery = _made(_RECOVERIES, params)
     return recovery
-
-
-def _footprint_cost(costmap: LayeredCostmap, pose: Pose2D) -> float:
-    return footprint_cost(costmap.spec, costmap.costs, costmap.footprint, pose)
