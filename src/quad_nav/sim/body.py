@@ -243,7 +243,12 @@ class World:
         return [touches[key] for key in sorted(touches)]
 
     def cast(self, starts_m: Floats, ends_m: Floats) -> Floats:
-        """Cast rays; see ``casters.RayWorld``. Beams start inside the robot's own guard."""
+        """Cast rays from and to float64[m, 3] in ``map``.
+
+        Returns:
+            float64[m], distance to the first hit as a fraction of the ray's length; +inf for no
+            hit. A ray does not hit a solid that it starts in, such as its own quadcopter's guard.
+        """
         self._rebuild()
         starts, ends = starts_m.tolist(), ends_m.tolist()
         hits: List[float] = []

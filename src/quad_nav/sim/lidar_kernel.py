@@ -142,21 +142,9 @@ def _cast_at_solids(
     """Shorten the beams, float64[m], to where they enter solids, near ones first.
 
     Most others are hidden behind the near ones, which a rough sector is enough to tell.
-
-    Args:
-        row: The beams' lengths.
-        origin: Position of the LIDAR.
-        rotation: float64[3, 3], axes of the LIDAR in ``map`` as columns.
-        beams: The beams.
-        solids: The solids.
-        columns: float64[8, s], ``sectors.columns_of`` them.
     """
     count = solids.kinds.shape[0]
-    axes = (
-        (rotation[0, 0], rotation[1, 0], rotation[2, 0]),
-        (rotation[0, 1], rotation[1, 1], rotation[2, 1]),
-        (rotation[0, 2], rotation[1, 2], rotation[2, 2]),
-    )
+    axes = triple(rotation[:, 0]), triple(rotation[:, 1]), triple(rotation[:, 2])
     rough = np.empty((3, count))
     rough_sectors(columns, origin, axes, rough)
     firsts, nexts = np.full(_RINGS, -1), np.empty(count, np.int64)  # lists of each ring's solids

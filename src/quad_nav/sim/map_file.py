@@ -80,11 +80,8 @@ class OccupancyMap:
 
     def occupied(self, unknown_too: bool) -> NDArray[np.bool_]:
         """Return the mask bool[H, W] of occupied cells, with unknown ones if asked."""
-        return (
-            (self.occupancy >= OCCUPIED) | (self.occupancy == UNKNOWN)
-            if unknown_too
-            else self.occupancy >= OCCUPIED
-        )
+        occupied: NDArray[np.bool_] = self.occupancy >= OCCUPIED
+        return occupied | (self.occupancy == UNKNOWN) if unknown_too else occupied
 
     def is_free(self, x_m: float, y_m: float) -> bool:
         """Return whether the cell at a point in ``map`` is known to be free."""
@@ -116,27 +113,15 @@ class OccupancyMap:
         """
         rectangles = rectangles_of(self.occupied(unknown_too)).tolist()
         if len(rectangles) > MAX_BOXES:
-            raise InputError(
-                [
-                    f"{self.fields.image}: occupied cells make {len(rectangles)} boxes, "
-                    f"expected {MAX_BOXES} at most (remove isolated pixels from the image)"
-                ]
-            )
+            problem = f"occupied cells make {len(rectangles)} boxes, expected {MAX_BOXES} at most"
+            advice = "remove isolated pixels from the image"
+            raise InputError([f"{self.fields.image}: {problem} ({advice})"])
         resolution_m, yaw_rad = self.fields.resolution_m, self.fields.origin.yaw_rad
         boxes = []
         for number, (column, row, width, height) in enumerate(rectangles):
-            x_m, y_m = self._in_map(column + width / 2, row + height / 2)
-            boxes.append(
-                Box(
-                    f"map_{number}",
-                    x_m,
-                    y_m,
-                    width * resolution_m,
-                    height * resolution_m,
-                    height_m,
-                    yaw_rad,
-                )
-            )
+            centre = self._in_map(column + width / 2, row + height / 2)
+            sizes = (width * resolution_m, height * resolution_m, height_m)
+            boxes.append(Box(f"map_{number}", *centre, *sizes, yaw_rad))
         return boxes
 
 

@@ -178,12 +178,9 @@ def people_of(
             ):
                 break
         else:
-            raise InputError(
-                [
-                    f"scene {scene.name}: walkers: no room for person {number} of "
-                    f"{walkers.count}, {START_M:g} m from all start poses; expected fewer"
-                ]
-            )
+            place_m = f"{START_M:g} m from all start poses; expected fewer"
+            problem = f"no room for person {number} of {walkers.count}, {place_m}"
+            raise InputError([f"scene {scene.name}: walkers: {problem}"])
         starts.append(place)
     count = walkers.count
     return People(

@@ -42,11 +42,6 @@ def test_distances_are_between_hulls():
     assert log.min_separation_m("quad2") is None
 
 
-def test_positions_between_two_poses_are_interpolated():
-    log = logged({"quad0": [(0.0, 0.0, 0.0), (2.0, 4.0, 0.0)], "quad1": [(1.0, 2.0, 3.0)]})
-    assert log.min_separation_m("quad0") == pytest.approx(3.0 - 0.6)
-
-
 def test_positions_are_not_extrapolated():
     log = logged({"quad0": [(0.0, 0.0, 0.0), (1.0, 1.0, 0.0)], "quad1": [(1.5, 1.0, 0.1)]})
     assert log.min_separation_m("quad0") is None
@@ -109,23 +104,6 @@ def test_equal_stamps_and_interpolation_give_the_same_bits():
     )
     expected = nearest_separations_m(positions_m, RADIUS_M).min(axis=1)
     assert [log.min_separation_m(f"quad{k}") for k in range(3)] == expected.tolist()
-
-
-def test_minima_are_computed_once_for_all_robots():
-    calls = []
-
-    def counted(positions_m, times_s):
-        calls.append(len(positions_m))
-        return to_wall(positions_m, times_s)
-
-    names = [f"quad{k}" for k in range(20)]
-    log = DistanceLog(names, RADIUS_M, counted)
-    for name in names:
-        log.add(name, 0.0, 2.0, 0.0)
-    for name in names:
-        log.min_clearance_m(name)
-        log.min_separation_m(name)
-    assert len(calls) == len(names)
 
 
 def test_a_journal_gets_distances_before_their_block_ends():

@@ -10,7 +10,6 @@ import numpy as np
 import pybullet
 import pytest
 
-from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Twist2D, quaternion_from_euler
 from quad_nav.sim.body import World
 from quad_nav.sim.casters import KernelCaster, WorldCaster
@@ -132,18 +131,6 @@ def test_a_solid_around_the_lidar_is_not_seen(kind, size):
     assert np.isinf(cast(around, (3.0, 3.0, 1.0), QUARTERS)).all()
 
 
-def test_the_nearest_of_what_stands_in_line():
-    row = solids_of(
-        [
-            Cylinder("far", 8.0, 0.0, 0.5, 2.0),
-            Box("near", 3.0, 0.0, 1.0, 1.0, 2.0),
-            Box("middle", 5.0, 0.0, 1.0, 1.0, 2.0),
-        ]
-    )
-    assert cast(row, (0, 0, 1), AHEAD)[0] == pytest.approx(2.5)
-    assert cast(row, (4, 0, 1), AHEAD)[0] == pytest.approx(0.5)
-
-
 def test_nothing_beyond_the_range():
     assert np.isinf(cast(solids_of([Box("box", 61.0, 0.0, 1.0, 1.0, 2.0)]), (0, 0, 1), AHEAD)[0])
 
@@ -226,31 +213,13 @@ def forest(random: np.random.Generator, count: int, size_m: float) -> Iterator:
 
 # Beside the physics engine, for whose rays solids are up to a millimetre thicker.
 
+FOREST = tuple(forest(np.random.default_rng(1), 60, 20.0))
 STARTS = tuple(Pose2D(2.0 + k, 2.0) for k in range(8))
 SCENES = {
     "arena": ARENA,
-    "forest": Scene(
-        "forest",
-        20.0,
-        20.0,
-        1.0,
-        Walls(1.5),
-        tuple(forest(np.random.default_rng(1), 60, 20.0)),
-        STARTS,
-    ),
-    "boxes": Scene(
-        "boxes",
-        10.0,
-        10.0,
-        1.0,
-        Walls(3.0),
-        tuple(
-            solid for solid in forest(np.random.default_rng(2), 40, 10.0) if isinstance(solid, Box)
-        ),
-        STARTS,
-    ),
+    "forest": Scene("forest", 20.0, 20.0, 1.0, Walls(1.5), FOREST, STARTS),
 }
-ROUNDS = 130  # of 8 quadcopters
+ROUNDS = 60  # of 8 quadcopters
 MARGIN_M = 1e-3
 
 
@@ -285,13 +254,12 @@ def grown(caster: KernelCaster, by_m: float) -> KernelCaster:
 
 @pytest.fixture(params=list(SCENES), scope="module")
 def ranges(request) -> Tuple[np.ndarray, ...]:
-    """Of 1040 poses: the kernel's, the engine's, the kernel's of thicker, of thinner solids."""
+    """Of 480 poses: the engine's, the kernel's of thicker, of thinner solids."""
     scene, robots = SCENES[request.param], range(8)
     world = World(scene, scene.starts, Airframe(), 1.0 / 240)
     world.touches()  # it is built when it is needed
     casters = [
-        KernelCaster(PARAMS, scene, 8),
-        WorldCaster(PARAMS, world),
+        WorldCaster(PARAMS, world.cast),
         grown(KernelCaster(PARAMS, scene, 8), MARGIN_M),
         grown(KernelCaster(PARAMS, scene, 8), -MARGIN_M),
     ]
@@ -305,25 +273,9 @@ def ranges(request) -> Tuple[np.ndarray, ...]:
     return tuple(np.minimum(np.concatenate(rows), 2 * FAR_M) for rows in found)
 
 
-def test_ranges_are_the_engines_within_a_millimetre_but_at_grazing_edges(ranges):
-    """A beam grazes if 1 mm of thickness changes its range by more than 2 mm.
-
-    It then meets a face at less than 30 degrees, or an edge within a millimetre. All
-    others are within 2 mm, and next to all of them within 1 mm.
-    """
-    kernel, engine, thicker, thinner = ranges
-    off = np.abs(kernel - engine)
-    grazes = np.maximum(kernel - thicker, thinner - kernel) > 2.0 * MARGIN_M
-    assert (off > 1e-3).mean() < 0.01
-    assert ((off > 1e-3) & ~grazes).mean() < 0.003
-    assert off[~grazes].max() < 2e-3
-    assert np.median(off) < 1e-9
-    assert grazes.mean() < 0.1
-
-
 def test_every_range_of_the_engine_is_one_of_solids_up_to_a_millimetre_thicker(ranges):
     """Without exception, grazing or not; rounding in its single precision apart."""
-    _, engine, thicker, thinner = ranges
+    engine, thicker, thinner = ranges
     assert (engine > thicker - 1e-4).all()
     assert (engine < thinner + 1e-4).all()
 
@@ -357,8 +309,3 @@ def test_more_rays_than_the_engine_takes_at_once():
     )
     world.close()
     assert fractions == pytest.approx(np.full(count, 0.5))
-
-
-def test_another_caster_is_refused():
-    with pytest.raises(InputError, match="lidar: 'gazebo', expected kernel or bullet"):
-        SimulationParams(lidar_caster="gazebo")

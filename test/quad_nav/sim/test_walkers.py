@@ -66,15 +66,6 @@ def test_walks_follow_from_the_seed_and_go_to_and_fro(crowded):
     assert np.linalg.norm(first[:, None] - starts, axis=2).min() >= 1.5
 
 
-def test_people_are_seen_and_named(crowded):
-    assert [shape.name for shape in Movers(crowded, 3).shapes] == [f"person_{k}" for k in range(10)]
-    simulation = Simulation(crowded, 1, seed=3)
-    before = simulation.scan(0).ranges_m
-    simulation.advance(STEPS_PER_S)
-    assert np.abs(simulation.scan(0).ranges_m - before).max() > 0.5
-    simulation.close()
-
-
 def test_a_scene_without_room_for_people():
     full = Scene("closet", 1.0, 1.0, 1.0, Walls(), (), (Pose2D(0.5, 0.5),), walkers=Walkers(1))
     with pytest.raises(InputError, match="there is no free place for a person"):
