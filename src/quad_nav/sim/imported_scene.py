@@ -49,6 +49,9 @@ class ImportedScene:
     moving: Tuple[MovingObstacle, ...] = ()
 
 
+NOTHING = ImportedScene((), None, lambda x_m, y_m: True, ())
+
+
 def from_world(path: Path, model_path: Sequence[Path]) -> ImportedScene:
     """Import a Gazebo world; its extent is that of its obstacles.
 
