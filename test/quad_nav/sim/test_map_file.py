@@ -203,6 +203,7 @@ def test_all_faults_of_the_yaml_are_listed(tmp_path):
         (b"GIF89a", "m.pgm: is not a PGM or PNG image"),
         (b"P5 4 4 255\n12", "m.pgm: cannot be read: "),
         (b"P5 12000 10000 255\n", "m.pgm: is 12000 x 10000 pixels, expected 1 to 1e+08 pixels"),
+        (b"P5 8771 8771 65535\n", "m.pgm: 8771 x 8771 pixels"),
         (b"P5 100000 100000 255\n", "m.pgm: cannot be read: Image size (10000000000 pixels)"),
     ],
 )
