@@ -219,6 +219,11 @@ class _Round(Obstacle):
     radius_m: float
 
     @property
+    def half_m(self) -> Triple:
+        """Half of the extent along the obstacle's own x, y and z."""
+        return (self.radius_m, self.radius_m, self.height_m / 2)
+
+    @property
     def reach_m(self) -> float:
         """Radius of an upright cylinder around the centre that holds the obstacle."""
         return self.radius_m
@@ -254,11 +259,6 @@ class Cylinder(_Round):
     def values(self) -> Dict[str, Any]:
         """Return the values of the shape's own keys, without ``bottom``."""
         return {"radius": self.radius_m, "height": self.height_m}
-
-    @property
-    def half_m(self) -> Triple:
-        """Half of the extent along the obstacle's own x, y and z."""
-        return (self.radius_m, self.radius_m, self.height_m / 2)
 
     def surface_distance_m(self, x_m: Coordinate, y_m: Coordinate, z_m: float) -> Any:
         """Return the distance to the surface; see ``Obstacle.surface_distance_m``."""
@@ -318,11 +318,6 @@ class Sphere(_Round):
     def values(self) -> Dict[str, Any]:
         """Return the values of the shape's own keys, without ``bottom``."""
         return {"radius": self.radius_m}
-
-    @property
-    def half_m(self) -> Triple:
-        """Half of the extent along the obstacle's own x, y and z."""
-        return (self.radius_m, self.radius_m, self.radius_m)
 
     def surface_distance_m(self, x_m: Coordinate, y_m: Coordinate, z_m: float) -> Any:
         """Return the distance to the surface; see ``Obstacle.surface_distance_m``."""
