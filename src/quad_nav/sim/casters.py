@@ -121,13 +121,7 @@ class Lidars:
         self._noise = [np.random.default_rng([seed, 1, robot]) for robot in range(n_robots)]
 
     def scan(self, bodies: BodyState, robots: Sequence[int], now_s: float) -> List[Scan]:
-        """Return a scan of each of some robots.
-
-        Args:
-            bodies: State of all quadcopters.
-            robots: Numbers of the robots.
-            now_s: Present time, the stamp of the scans.
-        """
+        """Return a scan of each of some robots, with ``now_s`` as its stamp."""
         return [
             make_scan(self.params, now_s, row, self._noise[robot])
             for robot, row in zip(robots, self._caster.cast(bodies, robots))

@@ -53,11 +53,7 @@ NOTHING = ImportedScene((), None, lambda x_m, y_m: True, ())
 
 
 def from_world(path: Path, model_path: Sequence[Path]) -> ImportedScene:
-    """Import a Gazebo world; its extent is that of its obstacles.
-
-    Args:
-        path: The world file.
-        model_path: Further folders with models.
+    """Import a Gazebo world; its extent is that of its obstacles, also of those that move.
 
     Raises:
         InputError: A file has faults; lists all of them.
@@ -74,12 +70,7 @@ def from_world(path: Path, model_path: Sequence[Path]) -> ImportedScene:
 
 
 def from_map(path: Path, height_m: float, unknown_is_occupied: bool) -> ImportedScene:
-    """Import a map; its extent is that of its image.
-
-    Args:
-        path: The map's YAML file.
-        height_m: Height of the boxes that stand on occupied cells.
-        unknown_is_occupied: Put boxes on unknown cells too. Robots start on free cells only.
+    """Import a map; its extent is that of its image. Robots start on free cells only.
 
     Raises:
         InputError: A file has faults; lists all of them.

@@ -102,11 +102,7 @@ class OccupancyMap:
         return self.fields.origin.transform(column * resolution_m, row * resolution_m)
 
     def boxes(self, height_m: float, unknown_too: bool) -> List[Box]:
-        """Cover the occupied cells, and no other cells, with few disjoint boxes.
-
-        Args:
-            height_m: Height of the boxes.
-            unknown_too: Cover unknown cells too.
+        """Cover the occupied cells, unknown ones too if asked, with few disjoint boxes.
 
         Raises:
             InputError: There are more than ``MAX_BOXES`` boxes.
@@ -126,11 +122,7 @@ class OccupancyMap:
 
 
 def load_map(document: Any, path: Path) -> OccupancyMap:
-    """Check the document of a map's YAML file and read the image.
-
-    Args:
-        document: The parsed YAML.
-        path: The YAML file.
+    """Check the parsed document of a map's YAML file and read the image.
 
     Raises:
         InputError: The document or the image has faults; lists all of them.

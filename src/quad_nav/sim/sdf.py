@@ -111,16 +111,7 @@ def is_true(text: str) -> bool:
 def obstacle_of(
     reader: SdfReader, geometry: Element, name: str, map_from_shape: Pose3D
 ) -> Optional[Obstacle]:
-    """Convert a collision's geometry.
-
-    Args:
-        reader: Reader of the file; collects faults.
-        geometry: The ``<geometry>`` element.
-        name: Name of the obstacle.
-        map_from_shape: Pose of the shape.
-
-    Returns:
-        The obstacle, or None if it is the floor or has a fault.
+    """Convert a collision's ``<geometry>`` to an obstacle; None if it is the floor or has a fault.
 
     Raises:
         NotRepresented: No obstacle has this shape or pose.
@@ -189,16 +180,9 @@ def _tilt_rad(axis: NDArray[np.float64]) -> float:
 
 
 def actor_of(reader: SdfReader, actor: Element, name: str) -> Union[Cylinder, MovingObstacle, None]:
-    """Convert an actor.
+    """Convert an ``<actor>`` to a moving obstacle; None after a fault.
 
-    Args:
-        reader: Reader of the file; collects faults.
-        actor: The ``<actor>`` element.
-        name: Name of the obstacle.
-
-    Returns:
-        The moving obstacle; a cylinder at rest without waypoints or with ``<auto_start>`` false;
-        None after a fault.
+    Without waypoints or with ``<auto_start>`` false it is a cylinder at rest.
 
     Raises:
         NotRepresented: A plugin moves it, or a pose is relative to a frame.

@@ -18,16 +18,9 @@ _START_TRIES = 1000
 def start_poses(
     scene: Scene, n_robots: int, jitter_m: float, seed: int, body_radius_m: float = BODY_RADIUS_M
 ) -> List[Pose2D]:
-    """Displace the start poses of a scene at random.
+    """Displace the first start poses of a scene at random, each in a disc of ``jitter_m``.
 
     Each keeps clear of obstacles, walls and the starts before it.
-
-    Args:
-        scene: The scene.
-        n_robots: Number of start poses to use.
-        jitter_m: Radius of the disc around a start that it is displaced in.
-        seed: Seed of the displacements.
-        body_radius_m: Radius of the quadcopters' guards.
 
     Raises:
         InputError: The scene has too few starts, or a start has no free position around it.
