@@ -46,11 +46,6 @@ def test_distances_are_between_hulls():
     assert log.min_separation_m("quad2") is None
 
 
-def test_positions_between_two_poses_are_interpolated():
-    log = logged({"quad0": [(0.0, 0.0, 0.0), (2.0, 4.0, 0.0)], "quad1": [(1.0, 2.0, 3.0)]})
-    assert log.min_separation_m("quad0") == pytest.approx(3.0 - 0.6)
-
-
 def test_positions_are_not_extrapolated():
     log = logged({"quad0": [(0.0, 0.0, 0.0), (1.0, 1.0, 0.0)], "quad1": [(1.5, 1.0, 0.1)]})
     assert log.min_separation_m("quad0") is None
@@ -115,6 +110,7 @@ def test_equal_stamps_and_interpolation_give_the_same_bits():
     assert [log.min_separation_m(f"quad{k}") for k in range(3)] == expected.tolist()
 
 
+<<<<<<< HEAD
 def test_minima_are_computed_once_for_all_robots():
     calls = []
 
@@ -132,6 +128,8 @@ def test_minima_are_computed_once_for_all_robots():
     assert len(calls) == len(names)
 
 
+=======
+>>>>>>> w-sim
 def test_a_journal_gets_distances_before_their_block_ends():
     """1 m apart after 2 s; a block takes 10 s."""
     log = DistanceLog(["quad0", "quad1"], RADIUS_M)
