@@ -168,29 +168,6 @@ class Parameter:
         return value
 
 
-<<<<<<< HEAD
-def _numbers(kind: str, domain: Domain, doc: str) -> Callable[..., Any]:
-    """Return a function that declares numbers; None stands for a range without that end."""
-
-    def declare(
-        name: str, default: float, unit: str, low: Any, high: Any, sentence: str, **more: Any
-    ) -> Any:
-        accepted = more.pop("domain", domain)
-        return _declared(
-            Parameter(name, kind, default, sentence, unit, accepted, low, high), **more
-        )
-
-    declare.__doc__ = doc
-    return declare
-
-
-number = _numbers("double", NOT_NEGATIVE, "Declare a number, 0 or more.")
-positive = _numbers("double", POSITIVE, "Declare a number above 0.")
-signed = _numbers(
-    "double", ANY, "Declare a number that may be negative; below its range it is clamped."
-)
-whole = _numbers("int", ANY, "Declare a whole number; outside of its range it is clamped.")
-=======
 def number(
     name: str,
     default: float,
@@ -213,7 +190,6 @@ def number(
 positive = functools.partial(number, domain=POSITIVE)
 signed = functools.partial(number, domain=ANY)
 whole = functools.partial(number, domain=ANY, kind="int")
->>>>>>> w-sim
 
 
 def choice(name: str, default: int, choices: Tuple[Choice, ...], sentence: str, **more: Any) -> Any:

@@ -110,26 +110,6 @@ def test_equal_stamps_and_interpolation_give_the_same_bits():
     assert [log.min_separation_m(f"quad{k}") for k in range(3)] == expected.tolist()
 
 
-<<<<<<< HEAD
-def test_minima_are_computed_once_for_all_robots():
-    calls = []
-
-    def counted(positions_m, times_s):
-        calls.append(len(positions_m))
-        return to_wall(positions_m, times_s)
-
-    names = [f"quad{k}" for k in range(20)]
-    log = DistanceLog(names, RADIUS_M, counted)
-    for name in names:
-        add(log, name, 0.0, 2.0, 0.0)
-    for name in names:
-        log.min_clearance_m(name)
-        log.min_separation_m(name)
-    assert len(calls) == len(names)
-
-
-=======
->>>>>>> w-sim
 def test_a_journal_gets_distances_before_their_block_ends():
     """1 m apart after 2 s; a block takes 10 s."""
     log = DistanceLog(["quad0", "quad1"], RADIUS_M)
