@@ -16,10 +16,11 @@ from quad_nav.ros.common.conversions import marker_array, replacing_markers  # n
 from quad_nav.sim.motion import Motion, Walkers  # noqa: E402
 from quad_nav.sim.movers import Movers  # noqa: E402
 from quad_nav.sim.scene import Box, MovingObstacle, Scene, Walls  # noqa: E402
-from quad_nav.topics.markers import OBSTACLES_TOPIC, moving_markers, moving_poses  # noqa: E402
+from quad_nav.topics.markers import OBSTACLES_TOPIC, moving_markers  # noqa: E402
 from quad_nav.topics.tracked_obstacles import track_markers  # noqa: E402
-from quad_web.ros.layers import TrackIntake  # noqa: E402
+from quad_web.ros.layers import Layers  # noqa: E402
 from quad_web.ros.obstacles import Obstacles  # noqa: E402
+from quad_web.view.state import LAYERS  # noqa: E402
 
 CART = MovingObstacle(
     Box("cart", 1.0, 6.0, 1.0, 0.5, 2.0), Motion((0.0, 10.0), ((1.0, 6.0, -3.0), (5.0, 6.0, -3.0)))
@@ -60,15 +61,6 @@ def deliver(topic, message) -> None:
     topic.callback(topic.message_type().deserialize(buffer.getvalue()))
 
 
-def test_markers_tell_the_poses_that_they_were_made_of():
-    movers = Movers(STREET, 1)
-    message = marker_array(moving_markers(movers, 2.5))
-    assert moving_poses(message.markers, 3) == pytest.approx(movers.poses(2.5))
-    missing = moving_poses(message.markers[:1], 3)
-    assert missing[0] == pytest.approx([2.0, 6.0, -3.0])  # a quarter of the way
-    assert np.isnan(missing[1:]).all()
-
-
 def test_nothing_is_subscribed_to_where_nothing_moves():
     obstacles = Obstacles()
     assert obstacles.topics(None) == obstacles.topics(EMPTY) == {}
@@ -103,28 +95,23 @@ def test_markers_that_are_no_obstacles_are_dropped(number, x_m):
 def test_tracks_are_shown_in_map_until_the_last_one_has_ended():
     """odom0 is at (2, 1) in map and turned by 90 degrees."""
     frames = FakeFrames()
-    tracked = TrackIntake(0, frames)
-    ((name, topic),) = tracked.topics().items()
-    assert name == "/move_base0/moving_obstacles" and tracked.item() is None
+    layers = Layers(None, frames, lambda robot: {})
+    shown_layers = {layer: {0} if layer == "track" else set() for layer in LAYERS}
+    ((name, topic),) = layers.topics(shown_layers).items()
+    assert name == "/move_base0/moving_obstacles" and layers.items() == []
     shown = replacing_markers(track_markers(TRACKS, "odom0"))
     deliver(topic, shown)
-    assert tracked.item() is None  # the transform of odom0 is not known yet
+    assert layers.items() == []  # the transform of odom0 is not known yet
     frames.map_from_odom = Pose3D(2.0, 1.0, 0.0, quaternion_from_yaw(math.pi / 2))
     deliver(topic, shown)
-    item = tracked.item()
+    (item,) = layers.items()
     assert item.key == "track/0"
     (row,) = item.arrays["rows"].tolist()
     assert row == pytest.approx([2.0, 2.0, 0.0, 0.5, 0.3, 0.0])
-    assert tracked.item() is None
+    assert layers.items() == []
     deliver(topic, replacing_markers([]))
-    assert tracked.item().arrays["rows"].shape == (0, 6)
-
-
-def test_tracks_that_are_nowhere_are_refused():
-    tracked = TrackIntake(0, FakeFrames())
-    (topic,) = tracked.topics().values()
-    message = replacing_markers(track_markers(TRACKS, "map"))
-    message.markers[1].scale.x = math.inf
-    deliver(topic, message)
-    with pytest.raises(ValueError, match="marker disc 7"):
-        tracked.item()
+    (item,) = layers.items()
+    assert item.arrays["rows"].shape == (0, 6)
+    shown.markers[1].scale.x = math.inf  # it is nowhere
+    deliver(topic, shown)
+    assert layers.items() == []

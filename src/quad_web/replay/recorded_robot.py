@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bisect
 import math
-from dataclasses import dataclass
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -23,14 +22,8 @@ LOST_AFTER_S = 1.0
 poses are not interpolated."""
 
 
-@dataclass(frozen=True)
-class RecordedEvent:
-    """An entry of the log of events, see ``view.state.Event``."""
-
-    time_s: float
-    level: str
-    robot: Optional[int]
-    text: str
+RecordedEvent = Tuple[float, str, str, Optional[int]]
+"""Time, text, level and robot of an entry of the log of events."""
 
 
 class RobotTrack:
@@ -122,7 +115,7 @@ class RobotTrack:
         has_ended = leg is not None and not self.is_active(leg, time_s)
         return None if number < 0 or has_ended else number
 
-    def state(self, time_s: float) -> str:
+    def _state(self, time_s: float) -> str:
         """Return the navigator's state; what the goals tell if the recording has no states."""
         number = bisect.bisect_right(self._state_times_s, time_s) - 1
         if number >= 0:
@@ -130,12 +123,34 @@ class RobotTrack:
         leg = self.leg(time_s)
         return "idle" if leg is None or not self.is_active(leg, time_s) else "controlling"
 
-    def right_of_way(self, time_s: float) -> RightOfWay:
+    def now(self, time_s: float) -> rows.RobotNow:
+        """Return what is known of the robot at a time."""
+        leg, goals, age_s = self.leg(time_s), self.goals, self.age_s(time_s)
+        right, goal, distance_m, is_done = self._right_of_way(time_s), None, math.nan, False
+        if leg is not None and self.is_active(leg, time_s):
+            x_m, y_m = self.body(time_s)[:2]
+            goal, distance_m = leg.index + 1, math.hypot(leg.pose.x_m - x_m, leg.pose.y_m - y_m)
+        elif leg is not None:
+            is_done = bool(goals) and leg.index + 1 >= len(goals)
+        return rows.RobotNow(
+            self._state(time_s),
+            right.decision,
+            right.limited_by,
+            is_done=is_done,
+            is_lost=age_s > LOST_AFTER_S,
+            goal=goal,
+            goals=len(goals) or None,
+            distance_m=distance_m,
+            recoveries=self._recoveries(time_s),
+            age_s=age_s,
+        )
+
+    def _right_of_way(self, time_s: float) -> RightOfWay:
         """Return what the robot does for its peers."""
         number = bisect.bisect_right(self._right_times_s, time_s) - 1
         return self.robot.rights_of_way[number][1] if number >= 0 else RightOfWay()
 
-    def recoveries(self, time_s: float) -> Tuple[int, int]:
+    def _recoveries(self, time_s: float) -> Tuple[int, int]:
         """Return how many recovery behaviours began for the present goal, and how many exist."""
         leg = self.leg(time_s)
         since_s = -math.inf if leg is None else leg.sent_s
@@ -170,20 +185,17 @@ def events_of(robots: Sequence[RobotTrace]) -> List[RecordedEvent]:
     events: List[RecordedEvent] = []
     for row, robot in enumerate(robots):
         for goal in robot.goals:
+            name = f"goal {goal.index + 1}"
             place = f"({goal.pose.x_m:.2f}, {goal.pose.y_m:.2f})"
-            events.append(
-                RecordedEvent(goal.sent_s, "info", row, f"goal {goal.index + 1}: sent {place}")
-            )
-            if goal.ended_s is not None:
-                text = f"reached after {goal.ended_s - goal.sent_s:.1f} s"
-                level = "info" if goal.reached else "warning"
-                text = text if goal.reached else f"skipped: {goal.reason}"
-                events.append(
-                    RecordedEvent(goal.ended_s, level, row, f"goal {goal.index + 1}: {text}")
-                )
-        for at_s, name in robot.recoveries:
-            events.append(RecordedEvent(at_s, "warning", row, f"recovery {name}"))
+            events.append((goal.sent_s, f"{name}: sent {place}", "info", row))
+            if goal.ended_s is not None and goal.reached:
+                text = f"{name}: reached after {goal.ended_s - goal.sent_s:.1f} s"
+                events.append((goal.ended_s, text, "info", row))
+            elif goal.ended_s is not None:
+                events.append((goal.ended_s, f"{name}: skipped: {goal.reason}", "warning", row))
+        for at_s, recovery in robot.recoveries:
+            events.append((at_s, f"recovery {recovery}", "warning", row))
         for at_s, right in robot.rights_of_way:
             if right.decision is not None:
-                events.append(RecordedEvent(at_s, "info", row, right.text))
+                events.append((at_s, right.text, "info", row))
     return events

@@ -18,7 +18,6 @@ from visualization_msgs.msg import Marker, MarkerArray
 from quad_nav.errors import InputError, excerpt
 from quad_nav.geometry import yaw_from_quaternion
 from quad_nav.mission.actions import Event
-from quad_nav.peers.right_of_way import YieldDecision
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
@@ -49,22 +48,17 @@ class FlightReports:
         contacts: The last contacts.
         recoveries: Number of the last recovery behaviour of each robot's goal, and of all.
         sent_s: Wall time, monotonic, at which each robot's sequencer has sent its last goal.
-        version: Counts changes of scene, radius and trees; `contacts_version` those of contacts.
+        version: Counts changes of scene, radius and trees.
         resets: Counts resets of the simulation.
     """
 
     def __init__(self, robots: int, state: FleetState) -> None:
-        """Start without reports.
-
-        Args:
-            robots: Number of robots.
-            state: Its log of events gets what the nodes log.
-        """
+        """Start without reports; the log of events of ``state`` gets what the nodes log."""
         self.scene: Optional[Scene] = None
         self.radius_m = BODY_RADIUS_M
         self.trees: Dict[int, Mapping[str, Any]] = {}
         self.contacts: List[Contact] = []
-        self.version = self.contacts_version = self.resets = 0
+        self.version = self.resets = 0
         self._robots, self._state = robots, state
         self._failed: Set[Tuple[int, int]] = set()
         self._goals = Newest("/goals", MarkerArray)
@@ -142,7 +136,6 @@ class FlightReports:
             return
         with self._lock:
             self.contacts = [*self.contacts[1 - MAX_CONTACTS :], contact]
-            self.contacts_version += 1
         place = f"({contact.x_m:.2f}, {contact.y_m:.2f}) m"
         text = excerpt(f"CONTACT: {contact} at {place}", MAX_TEXT)
         self._state.add_event(contact.time_s, text, "error", self._robot_of(contact.robot))
@@ -185,13 +178,9 @@ class FlightReports:
             topic = f"/move_base{robot}/right_of_way"
             self._warnings.warn(f"web: {topic}: message dropped: {error}", kind="right of way")
 
-    def decision(self, robot: int) -> Optional[YieldDecision]:
-        """Return a robot's decision to yield, None if it does not yield."""
-        return self._right_of_way.get(robot, RightOfWay()).decision
-
-    def limited_by(self, robot: int) -> str:
-        """Return the name of the robot that limits a robot's command, "" if none does."""
-        return self._right_of_way.get(robot, RightOfWay()).limited_by
+    def right_of_way(self, robot: int) -> RightOfWay:
+        """Return what a robot does for its peers."""
+        return self._right_of_way.get(robot, RightOfWay())
 
     def goal_rows(self) -> List[Dict[str, Any]]:
         """Return the rows of the item ``goals``, from the markers of the sequencer."""
@@ -216,20 +205,16 @@ class FlightReports:
             found = _GOAL.fullmatch(marker.ns)
             if not found or int(found[1]) >= self._robots or marker.action != Marker.ADD:
                 continue
-            key, at, turn = (
-                (int(found[1]), marker.id),
-                marker.pose.position,
-                marker.pose.orientation,
-            )
+            key = int(found[1]), marker.id
+            at, turn = marker.pose.position, marker.pose.orientation
             if not (abs(at.x) <= MAX_MAGNITUDE and abs(at.y) <= MAX_MAGNITUDE):
                 continue
             if found[2]:
                 yaws[key] = yaw_from_quaternion((turn.x, turn.y, turn.z, turn.w))
                 continue
             alpha = marker.color.a
-            state = "active" if alpha > _ACTIVE_ALPHA else "pending"
-            if alpha < _REACHED_ALPHA:
-                state = "reached"
+            ended = "reached" if alpha < _REACHED_ALPHA else "pending"
+            state = "active" if alpha > _ACTIVE_ALPHA else ended
             rows.append({"robot": key[0], "index": key[1], "x": at.x, "y": at.y, "state": state})
         return [{**row, "yaw": yaws.get((row["robot"], row["index"]))} for row in rows]
 
