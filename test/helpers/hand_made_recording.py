@@ -15,7 +15,8 @@ from quad_nav.mission.actions import GoalEnded, SendGoal
 from quad_nav.mission.goal import Goal
 from quad_nav.recording import messages
 from quad_nav.recording.record_file import TopicWriter, create, stamp_at
-from quad_nav.sim.scene import BODY_RADIUS_M, Box, Scene, Walls
+from quad_nav.sim.obstacles import Box
+from quad_nav.sim.scene import BODY_RADIUS_M, Scene, Walls
 from quad_nav.topics.flight_info import FLIGHT_TOPIC, RobotInfo, simulation_info
 from quad_nav.topics.markers import CUBE, OBSTACLES_TOPIC, Marker
 from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event

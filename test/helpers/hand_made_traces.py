@@ -10,7 +10,8 @@ from quad_nav.geometry import Pose2D, quaternion_from_euler
 from quad_nav.navigator.tick import State
 from quad_nav.recording.trace import FlightTrace, GoalTrace, RobotTrace
 from quad_nav.sim.contacts import Contact
-from quad_nav.sim.scene import Box, Cylinder, Scene, Walls
+from quad_nav.sim.obstacles import Box, Cylinder
+from quad_nav.sim.scene import Scene, Walls
 
 RADIUS_M = 0.3
 SCENE = Scene(

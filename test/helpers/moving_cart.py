@@ -2,7 +2,8 @@
 
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.motion import Motion
-from quad_nav.sim.scene import Cylinder, MovingObstacle, Scene, Walls
+from quad_nav.sim.obstacles import Cylinder
+from quad_nav.sim.scene import MovingObstacle, Scene, Walls
 
 START = Pose2D(6.0, 5.0)
 

@@ -28,7 +28,7 @@ from quad_nav.offline.flight import StopAtContact
 from quad_nav.offline.run import fly
 from quad_nav.report.results import wilson_interval
 from quad_nav.sim.contacts import Contact
-from quad_nav.sim.scene import Cylinder
+from quad_nav.sim.obstacles import Cylinder
 
 ROOT = Path(__file__).resolve().parents[2]
 COLUMN_AHEAD = 14  # x = -2.325 m, 7.5 cm beside the straight way

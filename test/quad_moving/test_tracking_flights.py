@@ -16,7 +16,8 @@ from quad_nav.recording.bag_file import read_messages
 from quad_nav.recording.recorder import Recorder
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.motion import Motion
-from quad_nav.sim.scene import Cylinder, MovingObstacle
+from quad_nav.sim.obstacles import Cylinder
+from quad_nav.sim.scene import MovingObstacle
 
 ROOT = Path(__file__).resolve().parents[2]
 ON = (("scan_filters", [{"name": "tracker", "type": "quad_moving/Tracker"}]),)

@@ -13,7 +13,8 @@ from vehicles.stand_in import ACCEPTED, DENIED, FAILED, IN_AIR, ON_GROUND, TAKIN
 from vehicles.virtual_flight import StandInFlight
 
 from quad_nav.geometry import Pose2D
-from quad_nav.sim.scene import Box, Scene, Walls
+from quad_nav.sim.obstacles import Box
+from quad_nav.sim.scene import Scene, Walls
 from quad_nav.topics.vehicle_states import State
 
 HEADING_RAD = 0.5

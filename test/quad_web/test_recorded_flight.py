@@ -13,7 +13,8 @@ from quad_nav.errors import InputError
 from quad_nav.recording import messages
 from quad_nav.recording.bag_file import read_messages
 from quad_nav.sim.motion import Motion
-from quad_nav.sim.scene import BODY_RADIUS_M, Box, MovingObstacle
+from quad_nav.sim.obstacles import Box
+from quad_nav.sim.scene import BODY_RADIUS_M, MovingObstacle
 from quad_web.replay.recorded_flight import RecordedFlight
 from quad_web.replay.recording_index import RecordingIndex
 from quad_web.view.state import LAYERS

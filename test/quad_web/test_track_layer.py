@@ -13,7 +13,8 @@ from quad_nav.offline.run import fly
 from quad_nav.recording.recorder import Recorder
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.motion import Motion
-from quad_nav.sim.scene import Cylinder, MovingObstacle
+from quad_nav.sim.obstacles import Cylinder
+from quad_nav.sim.scene import MovingObstacle
 from quad_nav.topics.tracked_obstacles import TrackKind
 from quad_web.offline.actions import FlightActions
 from quad_web.offline.view import WebView

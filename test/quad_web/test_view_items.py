@@ -21,7 +21,8 @@ from quad_nav.mission.goal import Goal
 from quad_nav.peers.right_of_way import Yield, YieldDecision
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.motion import Motion, Walkers
-from quad_nav.sim.scene import Box, Cylinder, MovingObstacle, Scene, Sphere, Walls
+from quad_nav.sim.obstacles import Box, Cylinder, Sphere
+from quad_nav.sim.scene import MovingObstacle, Scene, Walls
 from quad_web.view.cells import buffered_cell, cell_items
 from quad_web.view.items import (
     TRAIL_POINTS,
@@ -71,11 +72,12 @@ def test_scene_has_the_arena_and_its_solids():
     assert (scene["size_m"], scene["origin_m"]) == ([8.0, 6.0], [-1.0, 2.0])
     assert scene["altitude_m"] == 1.0
     west, east, south, north = scene["walls"]
-    assert (west["x"], west["y"], west["size"]) == (-1.05, 5.0, [0.1, 6.0])
-    assert (north["y"], north["size"], north["crosses"]) == (8.05, [8.2, 0.1], True)
+    assert (west["x"], west["y"], west["outline"][0]) == (-1.05, 5.0, [0.05, 3.0])
+    assert (north["y"], north["outline"][0], north["crosses"]) == (8.05, [4.1, 0.05], True)
     crate, pillar, lamp = scene["solids"]
     assert crate == {
-        "kind": "box",
+        "shape": "box",
+        "outline": [[0.5, 0.25], [-0.5, 0.25], [-0.5, -0.25], [0.5, -0.25]],
         "x": 2.0,
         "y": 3.0,
         "bottom": 0.0,
@@ -83,10 +85,11 @@ def test_scene_has_the_arena_and_its_solids():
         "yaw": 0.5,
         "name": "crate",
         "crosses": False,  # its top is at 0.4 m, the quadcopters fly at 1 m
-        "size": [1.0, 0.5],
+        "reach": pytest.approx(0.559, abs=1e-3),
     }
-    assert (pillar["kind"], pillar["radius"], pillar["crosses"]) == ("cylinder", 0.3, True)
-    assert (lamp["kind"], lamp["bottom"], lamp["height"]) == ("sphere", 1.5, 1.0)
+    assert np.hypot(*np.transpose(pillar["outline"])) == pytest.approx(0.3, abs=1e-4)
+    assert (pillar["shape"], pillar["crosses"]) == ("cylinder", True)
+    assert (lamp["shape"], lamp["bottom"], lamp["height"]) == ("sphere", 1.5, 1.0)
     assert not lamp["crosses"]
 
 
@@ -103,8 +106,8 @@ def test_solids_that_move_are_apart_from_the_others():
     scene = scene_item(STREET).data
     assert [solid["name"] for solid in scene["solids"]] == ["crate", "pillar", "lamp"]
     cart, person = scene["moving"]
-    assert (cart["name"], cart["size"], cart["person"]) == ("cart", [1.0, 0.5], False)
-    assert (person["name"], person["radius"], person["person"]) == ("person_0", 0.25, True)
+    assert (cart["name"], cart["outline"][0], cart["person"]) == ("cart", [0.5, 0.25], False)
+    assert (person["name"], person["reach"], person["person"]) == ("person_0", 0.25, True)
 
 
 def test_obstacles_are_put_when_they_have_moved_and_people_look_where_they_walk():

@@ -15,7 +15,8 @@ from quad_nav.geometry import Pose3D, quaternion_from_yaw  # noqa: E402
 from quad_nav.ros.common.conversions import marker_array, replacing_markers  # noqa: E402
 from quad_nav.sim.motion import Motion, Walkers  # noqa: E402
 from quad_nav.sim.movers import Movers  # noqa: E402
-from quad_nav.sim.scene import Box, MovingObstacle, Scene, Walls  # noqa: E402
+from quad_nav.sim.obstacles import Box  # noqa: E402
+from quad_nav.sim.scene import MovingObstacle, Scene, Walls  # noqa: E402
 from quad_nav.topics.markers import OBSTACLES_TOPIC, moving_markers  # noqa: E402
 from quad_nav.topics.tracked_obstacles import track_markers  # noqa: E402
 from quad_web.ros.layers import Layers  # noqa: E402

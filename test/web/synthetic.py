@@ -24,7 +24,8 @@ from quad_nav.mission.goal import Goal
 from quad_nav.peers.right_of_way import Yield, YieldDecision
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.motion import Motion, Walkers
-from quad_nav.sim.scene import Box, Cylinder, MovingObstacle, Scene, Sphere, Walls
+from quad_nav.sim.obstacles import Box, Cylinder, Sphere
+from quad_nav.sim.scene import MovingObstacle, Scene, Walls
 from quad_web.server import Server, WebOptions
 from quad_web.view import items as views
 from quad_web.view import rows

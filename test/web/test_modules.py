@@ -156,11 +156,13 @@ def test_a_quadcopter_leans_to_where_its_thrust_pulls_it(run):
 
 def test_obstacles_are_found_under_the_pointer(run):
     body = """
-        const box = { kind: "box", x: 1, y: 1, size: [2, 0.2], yaw: Math.PI / 2, name: "box" };
-        const pillar = { kind: "cylinder", x: 4, y: 0, radius: 0.5, name: "pillar" };
-        const cart = { kind: "box", x: 4, y: 3, size: [1, 1], yaw: 0, name: "cart" };
+        const around = (a, b) => [[a, b], [-a, b], [-a, -b], [a, -b]];
+        const diamond = [[0.5, 0], [0, 0.5], [-0.5, 0], [0, -0.5]];
+        const box = { x: 1, y: 1, outline: around(1, 0.1), yaw: Math.PI / 2, name: "box" };
+        const pillar = { x: 4, y: 0, outline: diamond, yaw: 0, name: "pillar" };
+        const cart = { x: 4, y: 3, outline: around(0.5, 0.5), yaw: 0, name: "cart" };
         const fleet = { scene: { solids: [box, pillar], walls: [] }, obstacles: [cart] };
-        return [[1, 1.9], [1.9, 1], [4.3, 0.3], [4.4, 0.4], [4.4, 2.6]].map(
+        return [[1, 1.9], [1.9, 1], [4.2, 0.2], [4.3, 0.3], [4.4, 2.6]].map(
           ([x, y]) => solidAt(fleet, x, y)?.name ?? null);
     """
     assert run("fleet.js", "solidAt", body) == ["box", None, "pillar", None, "cart"]

@@ -26,7 +26,8 @@ from quad_bench.barn.arrays import Arrays, numbers_array, read_arrays, world_num
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.motion import Motion
-from quad_nav.sim.scene import Box, Cylinder, MovingObstacle, Scene, Walls
+from quad_nav.sim.obstacles import Box, Cylinder
+from quad_nav.sim.scene import MovingObstacle, Scene, Walls
 
 DIFFICULTIES = ("easy", "medium", "hard")
 START = Pose2D(11.0, 0.0, 3.14)

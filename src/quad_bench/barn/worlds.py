@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from quad_bench.barn.arrays import Arrays, numbers_array, read_arrays, world_numbers
 from quad_bench.barn.protocol import GOAL_M, START
 from quad_nav.errors import InputError
-from quad_nav.sim.scene import Cylinder, Scene, Walls
+from quad_nav.sim.obstacles import Cylinder
+from quad_nav.sim.scene import Scene, Walls
 
 ALTITUDE_M = 0.5
 """Half the cylinders' height: a tilted LIDAR sees neither the floor nor over close cylinders."""

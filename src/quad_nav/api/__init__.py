@@ -37,7 +37,8 @@ from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setu
 from quad_nav.scenario.scenario import read_configurations
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import LidarParams
-from quad_nav.sim.scene import Box, Cylinder, Scene, Sphere, Walls
+from quad_nav.sim.obstacles import Box, Cylinder, Sphere
+from quad_nav.sim.scene import Scene, Walls
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.sim.scene_writer import write_scene
 from quad_nav.sim.simulation_params import SimulationParams

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.measures import Tracks
 from quad_nav.report.plot import Json, numbers, rgb, symbol_scale
-from quad_nav.report.scene_drawing import CIRCLE_CORNERS, MOVING, outline
+from quad_nav.report.scene_drawing import MOVING
+from quad_nav.sim.obstacles import ROUND_CORNERS
 
 _MOST_FRAMES = 200
 _FRAME_S = 0.1  # shortest time between two frames, in simulated time
@@ -50,11 +51,11 @@ def _obstacle_frames(trace: FlightTrace, times_s: NDArray[np.float64]) -> List[J
     if movers is None:
         return []
     many = len(movers) * len(times_s) / _MOST_OUTLINES
-    corners = max(_FEWEST_CORNERS, int(CIRCLE_CORNERS / max(many, 1.0)))
+    corners = max(_FEWEST_CORNERS, int(ROUND_CORNERS / max(many, 1.0)))
     gap = np.full((1, 2), np.nan)
     frames = []
     for time_s in times_s.tolist():
-        shapes = [outline(solid, corners) for solid in movers.at(time_s)]
+        shapes = [solid.outline_m(corners) for solid in movers.at(time_s)]
         points = np.concatenate([gap, *(part for shape in shapes for part in (shape, gap))])[1:]
         frames.append({"x": numbers(points[:-1, 0], 2), "y": numbers(points[:-1, 1], 2)})
     return frames

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.report.preview_picture import cost_png, costmap_extent, shown_area
-from quad_nav.report.scene_drawing import MOVING, keyframe_paths, outline, outlines
+from quad_nav.report.scene_drawing import MOVING, keyframe_paths, outlines
 from quad_nav.scenario.preview import MissionPreview, RobotPreview
 from quad_nav.sim.colours import robot_rgba
 
@@ -37,7 +37,7 @@ def page_data(
         "costmap": _costmap(preview, robots),
         "solids": _lines(solids),
         "passed": _lines(passed),
-        "moving": _lines([outline(one) for one in preview.moving]),
+        "moving": _lines([one.outline_m() for one in preview.moving]),
         "motions": _lines(keyframe_paths(scene) if scene else []),
         "movingColor": MOVING,
         "robots": [

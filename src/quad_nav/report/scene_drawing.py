@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
-from matplotlib.patches import Circle, Patch, Rectangle
+from matplotlib.patches import Circle, Patch, Polygon
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
@@ -17,12 +16,11 @@ from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.measures import Tracks
 from quad_nav.report.style import centred_text, colour
 from quad_nav.sim.movers import Motions
-from quad_nav.sim.scene import Box, Obstacle, Scene
+from quad_nav.sim.obstacles import Obstacle
+from quad_nav.sim.scene import Scene
 
 Extent = Tuple[float, float, float, float]
 MOVING = "#cc5c33"
-CIRCLE_CORNERS = 32
-"""Corners of the outline of a round obstacle."""
 _SOLID, _EDGE = "#b9bfc6", "#7c858e"
 _PATH_POINTS = 1000
 _MOTION_STEP_S, _JUMP_M = 0.1, 1.0
@@ -43,9 +41,9 @@ def draw_scene(axes: Axes, scene: Optional[Scene], near: Optional[Extent] = None
     solids: List[Patch] = []
     passed: List[Patch] = []
     for solid in (*scene.wall_boxes(), *scene.obstacles):
-        if near is not None and not _reaches(solid, near):
+        if near is not None and not _is_near(solid, near):
             continue
-        (solids if _meets(solid, z_m) else passed).append(_outline(solid))
+        (solids if solid.crosses(z_m) else passed).append(Polygon(solid.outline_m()))
     axes.add_collection(
         PatchCollection(solids, facecolor=_SOLID, edgecolor=_EDGE, lw=0.8, zorder=1)
     )
@@ -102,7 +100,7 @@ def keyframe_paths(scene: Scene) -> List[NDArray[np.float64]]:
 
 def moving_patch(solid: Obstacle) -> Patch:
     """Return the outline of a moving obstacle."""
-    patch = _outline(solid)
+    patch = Polygon(solid.outline_m())
     patch.set(facecolor=MOVING, edgecolor=_EDGE, lw=0.8, alpha=0.7, zorder=3)
     return patch
 
@@ -118,53 +116,14 @@ def outlines(
     solids: List[NDArray[np.float64]] = []
     passed: List[NDArray[np.float64]] = []
     for solid in (*scene.wall_boxes(), *scene.obstacles):
-        (solids if _meets(solid, scene.altitude_m) else passed).append(outline(solid))
+        (solids if solid.crosses(scene.altitude_m) else passed).append(solid.outline_m())
     return solids, passed
 
 
-def _meets(solid: Obstacle, altitude_m: float) -> bool:
-    return solid.bottom_m <= altitude_m <= solid.bottom_m + solid.height_m
-
-
-def outline(solid: Obstacle, corners: int = CIRCLE_CORNERS) -> NDArray[np.float64]:
-    """Return the closed outline, shape (k, 2) in ``map``, of an obstacle.
-
-    Args:
-        solid: The obstacle.
-        corners: Corners of the outline of a round one.
-    """
-    if isinstance(solid, Box):
-        x_m, y_m = solid.size_x_m / 2, solid.size_y_m / 2
-        vertices = [(x_m, y_m), (-x_m, y_m), (-x_m, -y_m), (x_m, -y_m), (x_m, y_m)]
-        pose = Pose2D(solid.x_m, solid.y_m, solid.yaw_rad)
-        return np.array([pose.transform(*vertex) for vertex in vertices])
-    turns = np.linspace(0.0, 2 * np.pi, corners + 1)
-    return np.column_stack(
-        [solid.x_m + solid.radius_m * np.cos(turns), solid.y_m + solid.radius_m * np.sin(turns)]
-    )
-
-
-def _reaches(solid: Obstacle, near: Extent) -> bool:
+def _is_near(solid: Obstacle, near: Extent) -> bool:
     x0, x1, y0, y1 = near
-    reach_m = (
-        solid.radius_m
-        if not isinstance(solid, Box)
-        else math.hypot(solid.size_x_m, solid.size_y_m) / 2
-    )
+    reach_m = solid.reach_m
     return x0 - reach_m <= solid.x_m <= x1 + reach_m and y0 - reach_m <= solid.y_m <= y1 + reach_m
-
-
-def _outline(solid: Obstacle) -> Patch:
-    if not isinstance(solid, Box):
-        return Circle((solid.x_m, solid.y_m), solid.radius_m)
-    lower_left = (solid.x_m - solid.size_x_m / 2, solid.y_m - solid.size_y_m / 2)
-    return Rectangle(
-        lower_left,
-        solid.size_x_m,
-        solid.size_y_m,
-        angle=np.degrees(solid.yaw_rad),
-        rotation_point="center",
-    )
 
 
 def extent(scene: Optional[Scene], tracks: Tracks) -> Extent:

@@ -28,7 +28,8 @@ from quad_nav.scenario.flight_setup import (
 from quad_nav.scenario.goal_checks import place_check
 from quad_nav.scenario.scene_map import scene_map, scene_map_problem, scene_occupancy
 from quad_nav.sim.movers import Movers
-from quad_nav.sim.scene import Obstacle, Scene
+from quad_nav.sim.obstacles import Obstacle
+from quad_nav.sim.scene import Scene
 
 _ROUNDING_M = 1e-9
 NO_PLAN: NDArray[np.float64] = np.empty((0, 2))

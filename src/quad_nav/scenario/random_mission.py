@@ -20,7 +20,8 @@ from quad_nav.geometry import Pose2D
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.goal_file import DEFAULT_SETTINGS, GoalSequence, SequenceSettings
 from quad_nav.mission.robot_goals import RobotGoals, WatchedGoalFile
-from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Obstacle, Scene, Walls
+from quad_nav.sim.obstacles import Box, Cylinder, Obstacle
+from quad_nav.sim.scene import BODY_RADIUS_M, Scene, Walls
 from quad_nav.sim.scene_writer import write_scene
 
 AREA_PER_OBSTACLE_M2 = 18.0  # the tutorial's arena: 8 obstacles on 144 m2

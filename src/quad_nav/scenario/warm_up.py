@@ -124,8 +124,9 @@ def simulate() -> None:
     """
     from quad_nav.sim.map_file import rectangles_of
     from quad_nav.sim.motion import Motion, Walkers
+    from quad_nav.sim.obstacles import Cylinder
     from quad_nav.sim.robot_state import RobotStates
-    from quad_nav.sim.scene import Cylinder, MovingObstacle, Scene, Walls
+    from quad_nav.sim.scene import MovingObstacle, Scene, Walls
     from quad_nav.sim.simulation import Simulation
 
     rectangles_of(np.ones((2, 2), np.bool_))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,8 @@ from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.contacts import Touch
 from quad_nav.sim.flight import GRAVITY_MPS2, Airframe, BodyState
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
-from quad_nav.sim.scene import GUARD_HEIGHT_M, Box, Obstacle, Scene, Sphere
+from quad_nav.sim.obstacles import Box, Obstacle
+from quad_nav.sim.scene import GUARD_HEIGHT_M, Scene
 from quad_nav.sim.solids import grouped
 
 with discarded_stderr():  # pybullet prints its build time
@@ -34,6 +35,15 @@ _MAX_RAYS_PER_CALL = 16383
 _PARKED_M = 100.0
 """Depth below the floor at which quadcopters that are not engaged wait without contacts."""
 _LEVEL = [0.0, 0.0, 0.0, 1.0]
+_GEOMETRIES: Dict[str, Callable[[Obstacle], Tuple[int, Dict[str, Any]]]] = {
+    "box": lambda solid: (pybullet.GEOM_BOX, {"halfExtents": solid.half_m}),
+    "cylinder": lambda solid: (
+        pybullet.GEOM_CYLINDER,
+        {"radius": solid.half_m[0], "height": solid.height_m},
+    ),
+    "sphere": lambda solid: (pybullet.GEOM_SPHERE, {"radius": solid.half_m[0]}),
+}
+"""The engine's kind and sizes of each shape of obstacles."""
 
 GoalSphere = Tuple[Tuple[float, float, float], float, Tuple[float, float, float, float]]
 """Centre in metres, radius in metres, RGBA in 0..1."""
@@ -186,7 +196,7 @@ class World:
         for body, solid, (x_m, y_m, yaw_rad) in zip(
             self._moving_ids, self._scene.moving_shapes, poses.tolist()
         ):
-            place = [x_m, y_m, solid.bottom_m + solid.height_m / 2]
+            place = [x_m, y_m, solid.centre_m[2]]
             turn = quaternion_from_yaw(yaw_rad)
             pybullet.resetBasePositionAndOrientation(body, place, turn, self._client)
 
@@ -292,15 +302,14 @@ class World:
         return Touch(numbers[0], name or self._scene.nearest(*position).name, position)
 
     def _add_obstacle(self, solid: Obstacle) -> int:
-        kind, sizes = _shape(solid)
+        kind, sizes = _GEOMETRIES[solid.shape](solid)
         shape = pybullet.createCollisionShape(kind, physicsClientId=self._client, **sizes)
-        yaw_rad = solid.yaw_rad if isinstance(solid, Box) else 0.0
         return int(
             pybullet.createMultiBody(
                 0.0,
                 shape,
-                basePosition=[solid.x_m, solid.y_m, solid.bottom_m + solid.height_m / 2],
-                baseOrientation=quaternion_from_yaw(yaw_rad),
+                basePosition=solid.centre_m,
+                baseOrientation=quaternion_from_yaw(solid.yaw_rad),
                 physicsClientId=self._client,
             )
         )
@@ -309,9 +318,9 @@ class World:
         """Add boxes as one body, because each step visits all bodies."""
         shape = pybullet.createCollisionShapeArray(
             shapeTypes=[pybullet.GEOM_BOX] * len(boxes),
-            halfExtents=[[b.size_x_m / 2, b.size_y_m / 2, b.height_m / 2] for b in boxes],
-            collisionFramePositions=[[b.x_m, b.y_m, b.bottom_m + b.height_m / 2] for b in boxes],
-            collisionFrameOrientations=[quaternion_from_yaw(b.yaw_rad) for b in boxes],
+            halfExtents=[box.half_m for box in boxes],
+            collisionFramePositions=[box.centre_m for box in boxes],
+            collisionFrameOrientations=[quaternion_from_yaw(box.yaw_rad) for box in boxes],
             physicsClientId=self._client,
         )
         return int(
@@ -359,16 +368,6 @@ class World:
             physicsClientId=client,
         )
         return body
-
-
-def _shape(solid: Obstacle) -> Tuple[int, Dict[str, Any]]:
-    """Return the engine's kind and sizes of a shape."""
-    if isinstance(solid, Box):
-        half_m = [solid.size_x_m / 2, solid.size_y_m / 2, solid.height_m / 2]
-        return pybullet.GEOM_BOX, {"halfExtents": half_m}
-    if isinstance(solid, Sphere):
-        return pybullet.GEOM_SPHERE, {"radius": solid.radius_m}
-    return pybullet.GEOM_CYLINDER, {"radius": solid.radius_m, "height": solid.height_m}
 
 
 def _connect(gui: bool) -> int:

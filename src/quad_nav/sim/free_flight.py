@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from quad_nav.sim.flight import BodyState, FlightLaw
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
-from quad_nav.sim.movers import reach_m
 from quad_nav.sim.rigid_body import MOVING, NO_INDEX, FreeSpace, MovingSolids, fly_freely
 from quad_nav.sim.scene import GUARD_HEIGHT_M, Scene
 
@@ -53,9 +52,9 @@ class FreeFlight:
         shapes, reach = scene.moving_shapes, self._reach_m
         self._moving = MovingSolids(
             np.zeros((1, len(shapes), 3)),
-            np.array([reach_m(shape) + reach for shape in shapes], float),
+            np.array([shape.reach_m + reach for shape in shapes], float),
             np.array([shape.bottom_m - reach for shape in shapes], float),
-            np.array([shape.bottom_m + shape.height_m + reach for shape in shapes], float),
+            np.array([shape.top_m + reach for shape in shapes], float),
         )
 
     def advance(

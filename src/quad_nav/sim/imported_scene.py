@@ -11,7 +11,8 @@ from typing import Callable, Iterable, List, Optional, Sequence, Set, Tuple
 from quad_nav.files.document import read_yaml
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.map_file import load_map
-from quad_nav.sim.scene import BODY_RADIUS_M, Box, MovingObstacle, Obstacle, Scene, placed
+from quad_nav.sim.obstacles import Obstacle
+from quad_nav.sim.scene import BODY_RADIUS_M, MovingObstacle, Scene
 from quad_nav.sim.world_file import load_world
 
 Extent = Tuple[float, float, float, float]
@@ -60,8 +61,10 @@ def from_world(path: Path, model_path: Sequence[Path]) -> ImportedScene:
     named = _with_unique_names([*world.obstacles, *(one.shape for one in world.moving)])
     obstacles, shapes = named[: len(world.obstacles)], named[len(world.obstacles) :]
     moving = [replace(one, shape=shape) for one, shape in zip(world.moving, shapes)]
-    everywhere = (placed(one.shape, pose) for one in moving for pose in one.motion.poses)
-    corners = [corner for solid in (*obstacles, *everywhere) for corner in _corners(solid)]
+    everywhere = (one.shape.placed(pose) for one in moving for pose in one.motion.poses)
+    corners = [
+        corner for solid in (*obstacles, *everywhere) for corner in solid.outline_m().tolist()
+    ]
     return ImportedScene(
         tuple(obstacles), _extent(corners), lambda x_m, y_m: True, world.remarks, tuple(moving)
     )
@@ -95,21 +98,8 @@ def _with_unique_names(obstacles: Sequence[Obstacle]) -> List[Obstacle]:
             number += 1
             name = f"{obstacle.name}_{number}"
         taken.add(name)
-        named.append(obstacle if name == obstacle.name else replace(obstacle, name=name))
+        named.append(obstacle if name == obstacle.name else obstacle.changed(name=name))
     return named
-
-
-def _corners(obstacle: Obstacle) -> List[Tuple[float, float]]:
-    """Return points that span the extent of an obstacle along x and y."""
-    if isinstance(obstacle, Box):
-        pose = Pose2D(obstacle.x_m, obstacle.y_m, obstacle.yaw_rad)
-        x, y = obstacle.size_x_m / 2, obstacle.size_y_m / 2
-        return [pose.transform(*corner) for corner in ((-x, -y), (-x, y), (x, -y), (x, y))]
-    reach = obstacle.radius_m
-    return [
-        (obstacle.x_m - reach, obstacle.y_m - reach),
-        (obstacle.x_m + reach, obstacle.y_m + reach),
-    ]
 
 
 def _extent(corners: Iterable[Tuple[float, float]]) -> Optional[Extent]:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.files.kernel_cache import njit
-from quad_nav.sim.rays import Triple, dot, enter_solid, through_slab, triple, turn
+from quad_nav.sim.rays import CYLINDER, Triple, dot, enter_solid, through_slab, triple, turn
 from quad_nav.sim.sectors import Axes, columns_of, rough_sectors, sector_of
 
 _ROUNDING = 1e-6  # of a beam's number
@@ -235,7 +235,7 @@ def _cast_at_solid(
         return
     kind, to_solid = solids.kinds[solid], solids.rotations[solid]
     eye = turn(to_solid, offset)
-    if _surrounds(sizes, eye, beams.near_m):
+    if kind == CYLINDER and _surrounds(sizes, eye, beams.near_m):
         return
     ahead, left, up = turn(to_solid, axes[0]), turn(to_solid, axes[1]), turn(to_solid, axes[2])
     first_rad, width_rad = sector_of(kind, eye, ahead, left, up, sizes)
@@ -265,7 +265,7 @@ def _beams_of(first_rad: float, width_rad: float, beams: Beams) -> Tuple[float, 
 
 @njit(cache=True, nogil=True)
 def _surrounds(sizes: Triple, eye: Triple, near: float) -> bool:
-    """Tell whether a ball of radius ``near`` around the eye is well inside of a solid.
+    """Tell whether a ball of radius ``near`` around the eye is well inside of a cylinder.
 
     A quadcopter's own guard surrounds its LIDAR: no beam begins outside.
     """

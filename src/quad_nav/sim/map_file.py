@@ -28,7 +28,7 @@ from quad_nav.files.document import Checker, describe
 from quad_nav.files.user_files import referenced_file
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.map_image import Pixels, read_pixels
-from quad_nav.sim.scene import Box
+from quad_nav.sim.obstacles import Box
 
 Cells = NDArray[np.int8]
 

@@ -17,7 +17,8 @@ from quad_nav.geometry import rotate_vectors
 from quad_nav.sim.crowd_record import CrowdRecord
 from quad_nav.sim.keyframes import Keyframes, fill_poses
 from quad_nav.sim.motion import SPLINE, Motion
-from quad_nav.sim.scene import Box, Obstacle, Scene, placed
+from quad_nav.sim.obstacles import Obstacle
+from quad_nav.sim.scene import Scene
 from quad_nav.sim.walkers import REACTION_S, Crowd, round_down, walks
 
 Floats = NDArray[np.float64]
@@ -158,7 +159,8 @@ class Movers:
                 positions_m[..., 0] - x_m,
                 positions_m[..., 1] - y_m,
             )
-            own = at_origin(shape).surface_distance_m(*local, self._scene.altitude_m)
+            at_origin = shape.placed((0.0, 0.0, 0.0))
+            own = at_origin.surface_distance_m(*local, self._scene.altitude_m)
             np.fmin(nearest, own, out=nearest)  # nobody knows where NaN is
         return nearest
 
@@ -166,7 +168,7 @@ class Movers:
         """Return the obstacles where they are at a time, without those of which it is unknown."""
         poses = self.poses(now_s)
         known = np.isfinite(poses[:, 0])
-        return [placed(shape, pose) for shape, pose, at in zip(self.shapes, poses, known) if at]
+        return [shape.placed(pose) for shape, pose, at in zip(self.shapes, poses, known) if at]
 
 
 def phases_s(motions: Sequence[Motion], common_s: Optional[float], seed: int) -> List[float]:
@@ -189,15 +191,3 @@ def phases_s(motions: Sequence[Motion], common_s: Optional[float], seed: int) ->
         )
         for k, motion in enumerate(motions)
     ]
-
-
-def at_origin(shape: Obstacle) -> Obstacle:
-    """Return a shape at the origin, which keeps its height."""
-    return placed(shape, (0.0, 0.0, 0.0))
-
-
-def reach_m(shape: Obstacle) -> float:
-    """Return the radius of an upright cylinder around a shape's centre that holds it."""
-    if isinstance(shape, Box):
-        return math.hypot(shape.size_x_m, shape.size_y_m) / 2
-    return shape.radius_m

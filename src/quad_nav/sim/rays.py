@@ -2,11 +2,8 @@
 
 A ray is ``origin + t * direction``. Each function takes it in the solid's own frame, with the
 origin in its centre, as triples in metres, and returns the t at which it enters: negative when the
-ray begins inside or beyond, inf for a miss. A solid is a kind and three sizes in metres:
-
-    BOX       half of its extent along x, y, z
-    CYLINDER  radius, radius, half of its height; its axis is z
-    SPHERE    radius, radius, radius
+ray begins inside or beyond, inf for a miss. A solid is a kind and three sizes in metres, half of
+its extent along x, y, z. The axis of a CYLINDER is z.
 
 A convex solid is the intersection of pieces (slabs between two parallel faces, a tube). A ray is in
 all of them from its last entry to its first exit, if that is later.
@@ -25,6 +22,8 @@ from quad_nav.files.kernel_cache import njit
 Triple = Tuple[float, float, float]
 
 BOX, CYLINDER, SPHERE = 0, 1, 2
+KINDS = {"box": BOX, "cylinder": CYLINDER, "sphere": SPHERE}
+"""Kinds by ``Obstacle.shape``."""
 _PARALLEL = 1e-12  # of a direction of length 1; it strays from the faces by less than 1 nm
 
 
@@ -93,7 +92,9 @@ def enter_solid(kind: int, origin: Triple, direction: Triple, sizes: Triple) -> 
         return enter_box(origin, direction, sizes)
     if kind == CYLINDER:
         return enter_cylinder(origin, direction, sizes)
-    return enter_sphere(origin, direction, sizes)
+    if kind == SPHERE:
+        return enter_sphere(origin, direction, sizes)
+    raise ValueError("solid of an unknown kind")
 
 
 @njit(cache=True, nogil=True)

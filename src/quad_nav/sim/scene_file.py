@@ -44,17 +44,8 @@ from quad_nav.sim.motion_file import (
     read_phase,
     read_walkers,
 )
-from quad_nav.sim.scene import (
-    BODY_RADIUS_M,
-    Box,
-    Cylinder,
-    MovingObstacle,
-    Obstacle,
-    Scene,
-    Sphere,
-    Walls,
-    placed,
-)
+from quad_nav.sim.obstacles import SHAPES, Obstacle
+from quad_nav.sim.scene import BODY_RADIUS_M, MovingObstacle, Scene, Walls
 
 _KEYS = [
     "name",
@@ -69,11 +60,6 @@ _KEYS = [
     "unknown",
     *MOTION_KEYS,
 ]
-_SHAPE_KEYS = {
-    "box": ["name", "shape", "centre", "size", "height", "yaw", "bottom", "motion"],
-    "cylinder": ["name", "shape", "centre", "radius", "height", "bottom", "motion"],
-    "sphere": ["name", "shape", "centre", "radius", "bottom", "motion"],
-}
 _WORLD_SUFFIXES = (".world", ".sdf")
 MAX_SIZE_M = 1e5
 MAX_STARTS = 1000
@@ -240,7 +226,7 @@ def _read_obstacle(
     shape = _read_shape(check, entry, number)
     if shape is None or len(check.problems) > faults_before:
         return None
-    return MovingObstacle(placed(shape, (x_m, y_m, yaw_rad)), motion)
+    return MovingObstacle(shape.placed((x_m, y_m, yaw_rad)), motion)
 
 
 def _read_shape(check: Checker, entry: Any, number: int) -> Optional[Obstacle]:
@@ -249,33 +235,15 @@ def _read_shape(check: Checker, entry: Any, number: int) -> Optional[Obstacle]:
         check.fault(place, f"{describe(entry)}, expected a mapping that describes an obstacle")
         return None
     shape = entry.get("shape")
-    if not isinstance(shape, str) or shape not in _SHAPE_KEYS:
-        check.fault(f"{place}.shape", f"{describe(shape)}, expected box, cylinder or sphere")
+    kind = SHAPES.get(shape) if isinstance(shape, str) else None
+    if kind is None:
+        *most, last = SHAPES
+        check.fault(f"{place}.shape", f"{describe(shape)}, expected {', '.join(most)} or {last}")
         return None
-    check.mapping(entry, place, _SHAPE_KEYS[shape])
+    check.mapping(entry, place, ["name", "shape", "centre", *kind.keys, "motion"])
     name = check.text(entry, "name", place, f"obstacle_{number}")
-    x, y = check.numbers(entry, "centre", place, 2)
-    height = 1.0 if shape == "sphere" else check.number(entry, "height", place, positive=True)
-    bottom = check.number(entry, "bottom", place, 0.0)
-    if bottom < 0.0 and shape != "sphere":
-        check.fault(f"{place}.bottom", f"{bottom:g} m is below the floor, expected 0 or more")
-    obstacle: Obstacle
-    if shape != "box":
-        radius = check.number(entry, "radius", place, positive=True)
-        if bottom + 2 * radius <= 0.0:
-            check.fault(
-                f"{place}.bottom",
-                f"{bottom:g} m puts the obstacle below the floor, expected a higher one",
-            )
-        obstacle = (
-            Cylinder(name, x, y, radius, height, bottom)
-            if shape == "cylinder"
-            else Sphere(name, x, y, bottom + radius, radius)
-        )
-    else:
-        size_x, size_y = check.numbers(entry, "size", place, 2, positive=True)
-        yaw = check.number(entry, "yaw", place, 0.0)
-        obstacle = Box(name, x, y, size_x, size_y, height, yaw, bottom)
+    x_m, y_m = check.numbers(entry, "centre", place, 2)
+    obstacle = kind.read(check, entry, place, name, x_m, y_m)
     return obstacle if len(check.problems) == faults_before else None
 
 

@@ -9,7 +9,7 @@ from typing import Any, Dict
 import yaml
 
 from quad_nav.sim.motion_file import motion_document, phase_document, walkers_document
-from quad_nav.sim.scene import Box, Obstacle, Scene, Sphere
+from quad_nav.sim.scene import Scene
 
 
 def scene_document(scene: Scene) -> Dict[str, Any]:
@@ -32,9 +32,9 @@ def scene_document(scene: Scene) -> Dict[str, Any]:
         "walls": walls,
         **extra,
         "obstacles": [
-            *(_obstacle_document(solid) for solid in scene.obstacles),
+            *(solid.document() for solid in scene.obstacles),
             *(
-                {**_obstacle_document(one.shape), "motion": motion_document(one.motion)}
+                {**one.shape.document(), "motion": motion_document(one.motion)}
                 for one in scene.moving
             ),
         ],
@@ -62,16 +62,3 @@ def write_scene(scene: Scene, path: Path) -> None:
             for item in document[key]
         ]
     path.write_text("".join(lines), encoding="utf-8")
-
-
-def _obstacle_document(solid: Obstacle) -> Dict[str, Any]:
-    bottom = {"bottom": solid.bottom_m} if solid.bottom_m else {}
-    start = {"name": solid.name, "centre": [solid.x_m, solid.y_m]}
-    if isinstance(solid, Sphere):
-        return {**start, "shape": "sphere", "radius": solid.radius_m, **bottom}
-    shape: Dict[str, Any] = (
-        {"shape": "box", "size": [solid.size_x_m, solid.size_y_m], "yaw": solid.yaw_rad}
-        if isinstance(solid, Box)
-        else {"shape": "cylinder", "radius": solid.radius_m}
-    )
-    return {**start, **shape, "height": solid.height_m, **bottom}

@@ -12,7 +12,8 @@ from typing import Dict, List, Tuple, Union
 from quad_nav.files.xml_tree import Element
 from quad_nav.geometry import Pose3D
 from quad_nav.sim.motion import SPLINE, Motion, Walkers
-from quad_nav.sim.scene import Cylinder, MovingObstacle
+from quad_nav.sim.obstacles import Cylinder
+from quad_nav.sim.scene import MovingObstacle
 from quad_nav.sim.sdf_values import IDENTITY, NotRepresented, SdfReader, is_true
 
 PERSON_RADIUS_M, PERSON_HEIGHT_M = Walkers(1).radius_m, Walkers(1).height_m

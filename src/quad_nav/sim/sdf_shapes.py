@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import Optional, Union
+from typing import Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.files.xml_tree import Element
 from quad_nav.geometry import Pose3D
-from quad_nav.sim.scene import Box, Cylinder, Obstacle, Sphere
+from quad_nav.sim.obstacles import Box, Cylinder, Obstacle, Sphere
 from quad_nav.sim.sdf_values import NotRepresented, SdfReader
 
 UPRIGHT_RAD = 1e-3
@@ -54,17 +53,16 @@ def obstacle_of(
     obstacle = make(reader, shape, name, map_from_shape)
     if obstacle is None or len(reader.problems) > faults_before:
         return None
-    if obstacle.bottom_m + obstacle.height_m <= FLOOR_M:
+    if obstacle.top_m <= FLOOR_M:
         raise NotRepresented("nothing above the floor")
-    return obstacle if isinstance(obstacle, Sphere) else _above_floor(obstacle)
+    return obstacle
 
 
-def _above_floor(obstacle: Union[Box, Cylinder]) -> Obstacle:
-    """Return the part above the floor."""
-    sunk_m = max(0.0, -obstacle.bottom_m)
-    return replace(
-        obstacle, bottom_m=obstacle.bottom_m + sunk_m, height_m=obstacle.height_m - sunk_m
-    )
+def _above_floor(height_m: float, middle_m: float) -> Tuple[float, float]:
+    """Return height and bottom of the part above the floor of a solid around ``middle_m``."""
+    bottom_m = middle_m - height_m / 2
+    sunk_m = max(0.0, -bottom_m)
+    return height_m - sunk_m, bottom_m + sunk_m
 
 
 def _box(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle:
@@ -76,23 +74,16 @@ def _box(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle
         raise NotRepresented("tilted box")
     along, across = (up[0] + 1) % 3, (up[0] + 2) % 3
     yaw_rad = math.atan2(rotation[1, along], rotation[0, along])
-    return Box(
-        name,
-        pose.x_m,
-        pose.y_m,
-        sizes[along],
-        sizes[across],
-        sizes[up[0]],
-        yaw_rad,
-        pose.z_m - sizes[up[0]] / 2,
-    )
+    height_m, bottom_m = _above_floor(sizes[up[0]], pose.z_m)
+    place = (pose.x_m, pose.y_m)
+    return Box(name, *place, sizes[along], sizes[across], height_m, yaw_rad, bottom_m)
 
 
 def _cylinder(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle:
     radius_m, length_m = reader.length(shape, "radius"), reader.length(shape, "length")
     if _tilt_rad(pose.rotation[:, 2]) > UPRIGHT_RAD:
         raise NotRepresented("tilted cylinder")
-    return Cylinder(name, pose.x_m, pose.y_m, radius_m, length_m, pose.z_m - length_m / 2)
+    return Cylinder(name, pose.x_m, pose.y_m, radius_m, *_above_floor(length_m, pose.z_m))
 
 
 def _sphere(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.files.kernel_cache import njit
-from quad_nav.sim.rays import BOX, CYLINDER, Triple, dot, enter_box
+from quad_nav.sim.rays import CYLINDER, SPHERE, Triple, dot, enter_box
 
 Axes = Tuple[Triple, Triple, Triple]  # a LIDAR's x, y and z in ``map``
 
@@ -32,21 +32,21 @@ _ROUGH_RAD = 0.005  # more than the error of a rough bearing
 def sector_of(
     kind: int, eye: Triple, ahead: Triple, left: Triple, up: Triple, sizes: Triple
 ) -> Tuple[float, float]:
-    """Return the sector of a solid."""
+    """Return the sector of a solid; that of its bounding box unless it is round."""
     height = abs(dot(up, eye))
-    if kind == BOX:
-        if height > abs(up[0]) * sizes[0] + abs(up[1]) * sizes[1] + abs(up[2]) * sizes[2]:
-            return EMPTY
-        return _box_sector(eye, ahead, left, up, sizes)
     if kind == CYLINDER:
         if height > abs(up[2]) * sizes[2] + math.sqrt(up[0] * up[0] + up[1] * up[1]) * sizes[0]:
             return EMPTY
         return _cylinder_sector(eye, ahead, left, up, sizes)
-    if height > sizes[0]:
+    if kind == SPHERE:
+        if height > sizes[0]:
+            return EMPTY
+        return _disc_sector(
+            -dot(ahead, eye), -dot(left, eye), math.sqrt(sizes[0] * sizes[0] - height * height)
+        )
+    if height > abs(up[0]) * sizes[0] + abs(up[1]) * sizes[1] + abs(up[2]) * sizes[2]:
         return EMPTY
-    return _disc_sector(
-        -dot(ahead, eye), -dot(left, eye), math.sqrt(sizes[0] * sizes[0] - height * height)
-    )
+    return _box_sector(eye, ahead, left, up, sizes)
 
 
 @njit(cache=True, nogil=True)
@@ -125,7 +125,7 @@ def columns_of(
             columns[axis, k] = centres[k, axis]
             columns[3 + axis, k] = rotations[k, 2, axis]
         square = sizes[k, 0] * sizes[k, 0]
-        if kinds[k] == BOX:
+        if kinds[k] != CYLINDER and kinds[k] != SPHERE:
             square += sizes[k, 1] * sizes[k, 1]
         columns[6, k] = math.sqrt(square)
         columns[7, k] = math.sqrt(square + sizes[k, 2] * sizes[k, 2])

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from quad_nav.geometry import yaw_rotations
 from quad_nav.sim.lidar_kernel import SolidGrid, Solids
-from quad_nav.sim.rays import BOX, CYLINDER, SPHERE
-from quad_nav.sim.scene import Box, Obstacle, Scene, Sphere
+from quad_nav.sim.obstacles import Box, Obstacle
+from quad_nav.sim.rays import CYLINDER, KINDS, SPHERE
+from quad_nav.sim.scene import Scene
 
 _MANY = 500
 """Number of solids up to which projecting each is as fast as walking beams through a grid."""
@@ -62,28 +63,13 @@ def grouped(solids: Sequence[Obstacle]) -> Tuple[Sequence[Obstacle], List[List[B
 
 def solids_of(obstacles: Sequence[Obstacle]) -> Solids:
     """Return the solids with a row for each obstacle."""
-    kinds, centres, yaws, sizes = [], [], [], []
-    for solid in obstacles:
-        kind, yaw_rad, size = _shape(solid)
-        kinds.append(kind)
-        centres.append((solid.x_m, solid.y_m, solid.bottom_m + solid.height_m / 2))
-        yaws.append(yaw_rad)
-        sizes.append(size)
+    yaws = np.array([solid.yaw_rad for solid in obstacles], float)
     return Solids(
-        np.array(kinds, np.int64),
-        np.array(centres, float).reshape(-1, 3),
-        np.ascontiguousarray(np.swapaxes(yaw_rotations(np.array(yaws, float)), 1, 2)),
-        np.array(sizes, float).reshape(-1, 3),
+        np.array([KINDS[solid.shape] for solid in obstacles], np.int64),
+        np.array([solid.centre_m for solid in obstacles], float).reshape(-1, 3),
+        np.ascontiguousarray(np.swapaxes(yaw_rotations(yaws), 1, 2)),
+        np.array([solid.half_m for solid in obstacles], float).reshape(-1, 3),
     )
-
-
-def _shape(solid: Obstacle) -> Tuple[int, float, Tuple[float, float, float]]:
-    """Return kind, yaw and sizes as in ``sim.rays``."""
-    if isinstance(solid, Box):
-        return BOX, solid.yaw_rad, (solid.size_x_m / 2, solid.size_y_m / 2, solid.height_m / 2)
-    if isinstance(solid, Sphere):
-        return SPHERE, 0.0, (solid.radius_m, solid.radius_m, solid.radius_m)
-    return CYLINDER, 0.0, (solid.radius_m, solid.radius_m, solid.height_m / 2)
 
 
 def select(solids: Solids, rows: NDArray[np.int64]) -> Solids:
@@ -99,15 +85,13 @@ def join(first: Solids, second: Solids) -> Solids:
 def place(solids: Solids, poses: NDArray[np.float64]) -> None:
     """Move solids in place to poses (x_m, y_m, yaw_rad) in ``map``, float64[s, 3]."""
     solids.centres[:, :2] = poses[:, :2]
-    boxes = solids.kinds == BOX
-    solids.rotations[boxes] = np.swapaxes(yaw_rotations(poses[boxes, 2]), 1, 2)
+    turning = (solids.kinds != CYLINDER) & (solids.kinds != SPHERE)
+    solids.rotations[turning] = np.swapaxes(yaw_rotations(poses[turning, 2]), 1, 2)
 
 
 def extents(solids: Solids) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return lower and upper corners float64[s, 3] of the solids' bounding boxes in ``map``."""
     reach = np.sum(np.abs(solids.rotations) * solids.sizes[:, :, None], axis=1) + _PADDING_M
-    round_ = solids.kinds != BOX
-    reach[round_] = solids.sizes[round_] + _PADDING_M  # they have no corners, and stand upright
     return solids.centres - reach, solids.centres + reach
 
 

@@ -18,7 +18,8 @@ from quad_nav.errors import InputError
 from quad_nav.files.user_files import referenced_file
 from quad_nav.files.xml_tree import Element, read_xml
 from quad_nav.geometry import Pose3D
-from quad_nav.sim.scene import MovingObstacle, Obstacle
+from quad_nav.sim.obstacles import Obstacle
+from quad_nav.sim.scene import MovingObstacle
 from quad_nav.sim.sdf_actors import actor_of
 from quad_nav.sim.sdf_shapes import obstacle_of
 from quad_nav.sim.sdf_values import IDENTITY, NotRepresented, SdfReader, is_true

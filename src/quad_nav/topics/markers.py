@@ -19,11 +19,13 @@ from quad_nav.mission.sequencer import Sequencer
 from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.movers import Movers
-from quad_nav.sim.scene import BODY_RADIUS_M, Box, Obstacle, Scene, Sphere
+from quad_nav.sim.obstacles import Box, Obstacle
+from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 
 # Shapes, numbered as in visualization_msgs/Marker.
 ARROW = 0
 CUBE, SPHERE, CYLINDER, CUBE_LIST, TEXT = 1, 2, 3, 6, 9
+_KINDS = {"box": CUBE, "cylinder": CYLINDER, "sphere": SPHERE}  # by Obstacle.shape
 
 _WALL_RGBA = (0.55, 0.60, 0.65, 0.35)
 _OBSTACLE_RGBA = (0.62, 0.50, 0.38, 1.0)
@@ -294,9 +296,7 @@ def _box_lists(boxes: Sequence[Box]) -> List[Marker]:
     markers = []
     for number, ((size, yaw_rad), group) in enumerate(alike.items()):
         turned = Pose2D(0.0, 0.0, yaw_rad)
-        points = tuple(
-            (*turned.inverse_transform(b.x_m, b.y_m), b.bottom_m + b.height_m / 2) for b in group
-        )
+        points = tuple((*turned.inverse_transform(b.x_m, b.y_m), b.centre_m[2]) for b in group)
         markers.append(
             Marker(
                 "map",
@@ -314,18 +314,7 @@ def _box_lists(boxes: Sequence[Box]) -> List[Marker]:
 
 
 def _solid(solid: Obstacle, namespace: str, number: int, rgba: Rgba) -> Marker:
-    place = (solid.x_m, solid.y_m, solid.bottom_m + solid.height_m / 2)
-    if isinstance(solid, Box):
-        return Marker(
-            "map",
-            namespace,
-            number,
-            CUBE,
-            place,
-            (solid.size_x_m, solid.size_y_m, solid.height_m),
-            rgba,
-            solid.yaw_rad,
-        )
-    diameter = 2 * solid.radius_m
-    kind = SPHERE if isinstance(solid, Sphere) else CYLINDER
-    return Marker("map", namespace, number, kind, place, (diameter, diameter, solid.height_m), rgba)
+    x_m, y_m, z_m = solid.half_m
+    size_m = (2 * x_m, 2 * y_m, 2 * z_m)
+    kind = _KINDS[solid.shape]
+    return Marker("map", namespace, number, kind, solid.centre_m, size_m, rgba, solid.yaw_rad)

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from quad_nav.errors import InputError
 from quad_nav.sim.movers import Movers
-from quad_nav.sim.scene import Obstacle, Scene
+from quad_nav.sim.obstacles import Obstacle
+from quad_nav.sim.scene import Scene
 from quad_nav.topics.markers import OBSTACLES_TOPIC, moving_poses
 from quad_web.replay.recording_index import RecordingIndex
 from quad_web.view.items import ObstacleItems, moving_solids

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
-from quad_nav.sim.scene import Obstacle, Scene
+from quad_nav.sim.obstacles import Obstacle
+from quad_nav.sim.scene import Scene
 from quad_nav.topics.markers import OBSTACLES_TOPIC, moving_poses
 from quad_web.ros.intake import Newest, Topic
 from quad_web.view.items import ObstacleItems, moving_solids

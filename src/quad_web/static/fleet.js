@@ -206,20 +206,23 @@ export function levelOf(solid, altitude) {
   return solid.bottom >= altitude ? "high" : "low";
 }
 
+/** Return the corners [x, y] of a solid's outline in `map`. */
+export function outlineOf({ outline, x, y, yaw }) {
+  const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
+  return outline.map(([u, v]) => [x + cos * u - sin * v, y + sin * u + cos * v]);
+}
+
 /** Return the obstacle or wall that covers a point, null if there is none. */
 export function solidAt({ scene, obstacles }, x, y) {
-  const covers = (solid) => {
-    const dx = x - solid.x;
-    const dy = y - solid.y;
-    if (solid.kind !== "box") {
-      return Math.hypot(dx, dy) <= solid.radius;
-    }
-    const [cos, sin] = [Math.cos(solid.yaw ?? 0), Math.sin(solid.yaw ?? 0)];
-    const [width, depth] = solid.size;
-    return (
-      Math.abs(cos * dx + sin * dy) <= width / 2 && Math.abs(cos * dy - sin * dx) <= depth / 2
-    );
-  };
   const solids = [...(obstacles ?? []), ...(scene?.solids ?? []), ...(scene?.walls ?? [])];
-  return solids.find(covers) ?? null;
+  return solids.find((solid) => covers(outlineOf(solid), x, y)) ?? null;
+}
+
+/** Return whether a polygon covers a point: a ray from there along x crosses an odd side. */
+function covers(corners, x, y) {
+  const crossed = corners.filter(([ax, ay], i) => {
+    const [bx, by] = corners.at(i - 1);
+    return ay > y !== by > y && x < ax + ((bx - ax) * (y - ay)) / (by - ay);
+  });
+  return crossed.length % 2 === 1;
 }

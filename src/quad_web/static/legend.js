@@ -63,9 +63,20 @@ function scan(context) {
   drawScans(context, viewport(), scans);
 }
 
+const BOX = [
+  [12, 7],
+  [-12, 7],
+  [-12, -7],
+  [12, -7],
+];
+const DISC = Array.from({ length: 32 }, (_, i) => {
+  const angle = (Math.PI * i) / 16;
+  return [9 * Math.cos(angle), 9 * Math.sin(angle)];
+});
+
 function solid(bottom, height, crosses) {
   return (context) => {
-    const box = { kind: "box", x: 0, y: 0, size: [24, 14], yaw: 0, bottom, height, crosses };
+    const box = { outline: BOX, x: 0, y: 0, yaw: 0, bottom, height, crosses };
     drawSolids(context, viewport(), { altitude_m: ALTITUDE_M, solids: [box], walls: [] });
   };
 }
@@ -141,8 +152,8 @@ const ENTRIES = [
   ["costmap", "Inscribed: the centre collides", costs(99, 99)],
   ["costmap", "Lethal: an obstacle", costs(100, 100)],
   ["costmap", "Unknown", costs(-1, -1)],
-  ["moving", "Moving obstacle", moving({ kind: "box", size: [24, 14] })],
-  ["moving", "Person: the tip is ahead", moving({ kind: "cylinder", radius: 9, hasHeading: true })],
+  ["moving", "Moving obstacle", moving({ outline: BOX })],
+  ["moving", "Person: the tip is ahead", moving({ outline: DISC, reach: 9, hasHeading: true })],
   ["map", "Obstacle at the flying altitude", solid(0, 2, true)],
   ["map", "Obstacle below it", solid(0, 0.5, false)],
   ["map", "Obstacle above it", solid(1.5, 0.5, false)],

@@ -4,7 +4,7 @@
  */
 
 import { INK, paintCosts } from "./colours.js";
-import { levelOf } from "./fleet.js";
+import { levelOf, outlineOf } from "./fleet.js";
 import { roundLength } from "./viewport.js";
 
 const COSTMAP_OPACITY = 0.55;
@@ -87,7 +87,7 @@ export function drawObstacles(context, viewport, obstacles, altitude) {
 }
 
 /** Draw a white triangle that points ahead, into a person. */
-function drawHeading(context, viewport, { x, y, yaw, radius }) {
+function drawHeading(context, viewport, { x, y, yaw, reach }) {
   const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
   const corners = [
     [0.9, 0],
@@ -96,7 +96,7 @@ function drawHeading(context, viewport, { x, y, yaw, radius }) {
   ];
   context.beginPath();
   corners.forEach(([u, v], i) => {
-    const at = [x + radius * (cos * u - sin * v), y + radius * (sin * u + cos * v)];
+    const at = [x + reach * (cos * u - sin * v), y + reach * (sin * u + cos * v)];
     i ? context.lineTo(...viewport.toScreen(...at)) : context.moveTo(...viewport.toScreen(...at));
   });
   context.closePath();
@@ -106,7 +106,10 @@ function drawHeading(context, viewport, { x, y, yaw, radius }) {
 
 function drawSolid(context, viewport, solid, level, look) {
   context.beginPath();
-  outline(context, viewport, solid);
+  for (const [x, y] of outlineOf(solid)) {
+    context.lineTo(...viewport.toScreen(x, y));
+  }
+  context.closePath();
   context.setLineDash(level === "high" ? [6, 4] : []);
   if (level !== "high") {
     context.fillStyle = level === "across" ? look.fill : hatch(context);
@@ -116,27 +119,6 @@ function drawSolid(context, viewport, solid, level, look) {
   context.strokeStyle = level === "across" ? look.edge : look.passed;
   context.stroke();
   context.setLineDash([]);
-}
-
-function outline(context, viewport, solid) {
-  const [px, py] = viewport.toScreen(solid.x, solid.y);
-  if (solid.kind !== "box") {
-    context.arc(px, py, solid.radius * viewport.scale, 0, 2 * Math.PI);
-    return;
-  }
-  const [cos, sin] = [Math.cos(solid.yaw ?? 0), Math.sin(solid.yaw ?? 0)];
-  const [a, b] = [solid.size[0] / 2, solid.size[1] / 2];
-  const corners = [
-    [a, b],
-    [-a, b],
-    [-a, -b],
-    [a, -b],
-  ];
-  corners.forEach(([u, v], i) => {
-    const corner = viewport.toScreen(solid.x + cos * u - sin * v, solid.y + sin * u + cos * v);
-    i ? context.lineTo(...corner) : context.moveTo(...corner);
-  });
-  context.closePath();
 }
 
 let hatchTile = null;

@@ -62,10 +62,10 @@ export class MovingObstacles {
 }
 
 /** Return a triangle on a person's head that points ahead. */
-function tip({ radius, bottom, height }) {
+function tip({ reach, bottom, height }) {
   const z = bottom + height + TIP_ABOVE_M;
   const corners = [0.9, 0, z, -0.4, 0.5, z, -0.4, -0.5, z];
-  const scaled = corners.map((length, i) => (i % 3 === 2 ? length : radius * length));
+  const scaled = corners.map((length, i) => (i % 3 === 2 ? length : reach * length));
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute("position", new THREE.Float32BufferAttribute(scaled, 3));
   const material = new THREE.MeshBasicMaterial({ color: "#ffffff", side: THREE.DoubleSide });

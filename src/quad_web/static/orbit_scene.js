@@ -59,7 +59,7 @@ export function disposeParts(object) {
 /** Add a solid and its edges to a group. */
 export function addSolid(group, solid, { color, opacity, edge = INK.solidEdge }) {
   const geometry = shapeOf(solid)
-    .rotateZ(solid.yaw ?? 0)
+    .rotateZ(solid.yaw)
     .translate(solid.x, solid.y, solid.bottom + solid.height / 2);
   const isGlass = opacity < 1;
   const material = new THREE.MeshLambertMaterial({
@@ -75,14 +75,14 @@ export function addSolid(group, solid, { color, opacity, edge = INK.solidEdge })
   group.add(new THREE.Mesh(geometry, material), edges);
 }
 
-function shapeOf({ kind, size, radius, height }) {
-  if (kind === "sphere") {
-    return new THREE.SphereGeometry(radius, 24, 16);
+/** Return the geometry of a solid around its centre: but for a sphere, its outline drawn up. */
+function shapeOf({ shape, outline, height }) {
+  if (shape === "sphere") {
+    return new THREE.SphereGeometry(height / 2, 24, 16);
   }
-  if (kind === "cylinder") {
-    return new THREE.CylinderGeometry(radius, radius, height, 32).rotateX(Math.PI / 2);
-  }
-  return new THREE.BoxGeometry(size[0], size[1], height);
+  const base = new THREE.Shape(outline.map(([x, y]) => new THREE.Vector2(x, y)));
+  const options = { depth: height, bevelEnabled: false };
+  return new THREE.ExtrudeGeometry(base, options).translate(0, 0, -height / 2);
 }
 
 /** Costmaps as pictures on the floor. */

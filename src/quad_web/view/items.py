@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.grid import GridSpec
 from quad_nav.sim.colours import robot_rgba
-from quad_nav.sim.scene import Box, Obstacle, Scene, Sphere, placed
+from quad_nav.sim.obstacles import Obstacle
+from quad_nav.sim.scene import Scene
 from quad_web.view.state import Item
 
 Floats = NDArray[np.float64]
@@ -88,7 +89,7 @@ class ObstacleItems:
 def moving_solids(scene: Scene, poses: Any) -> List[Obstacle]:
     """Return the moving obstacles at poses float[m, 3]; those with NaN are left out."""
     known = np.isfinite(np.asarray(poses, np.float64)).all(axis=1)
-    return [placed(shape, pose) for shape, pose, at in zip(scene.moving_shapes, poses, known) if at]
+    return [shape.placed(pose) for shape, pose, at in zip(scene.moving_shapes, poses, known) if at]
 
 
 def robots_item(
@@ -255,23 +256,15 @@ class Trails:
 
 
 def _solid(solid: Obstacle, altitude_m: float) -> Dict[str, Any]:
-    top_m = solid.bottom_m + solid.height_m
-    described: Dict[str, Any] = {
-        "kind": "box"
-        if isinstance(solid, Box)
-        else "sphere"
-        if isinstance(solid, Sphere)
-        else "cylinder",
+    return {
+        "shape": solid.shape,
+        "outline": np.round(solid.corners_m(), 4).tolist(),  # to 0.1 mm, in its own frame
         "x": solid.x_m,
         "y": solid.y_m,
+        "yaw": solid.yaw_rad,
         "bottom": solid.bottom_m,
         "height": solid.height_m,
-        "yaw": 0.0,
+        "reach": solid.reach_m,
         "name": solid.name,
-        "crosses": solid.bottom_m <= altitude_m <= top_m,
+        "crosses": solid.crosses(altitude_m),
     }
-    if isinstance(solid, Box):
-        described.update(size=[solid.size_x_m, solid.size_y_m], yaw=solid.yaw_rad)
-    else:
-        described.update(radius=solid.radius_m)
-    return described

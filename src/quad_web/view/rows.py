@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from quad_nav.mission.goal import Goal
 from quad_nav.peers.right_of_way import Yield, YieldDecision
 from quad_nav.sim.contacts import Contact
-from quad_nav.sim.scene import Obstacle, Scene
+from quad_nav.sim.obstacles import Obstacle
+from quad_nav.sim.scene import Scene
 from quad_web.view.state import Item
 
 HOVERS_BELOW_MPS = 0.03

@@ -22,7 +22,8 @@ from quad_nav.offline.run import fly
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.motion import Motion, Walkers
-from quad_nav.sim.scene import Cylinder, MovingObstacle
+from quad_nav.sim.obstacles import Cylinder
+from quad_nav.sim.scene import MovingObstacle
 from quad_nav.sim.simulation_params import SimulationParams
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -8,7 +8,8 @@ from quad_nav.geometry import Pose2D
 from quad_nav.offline.run import fly
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.scenario.scene_map import scene_map
-from quad_nav.sim.scene import Box, Cylinder, Scene, Walls
+from quad_nav.sim.obstacles import Box, Cylinder
+from quad_nav.sim.scene import Scene, Walls
 
 ROOT = Path(__file__).resolve().parents[3]
 

@@ -6,7 +6,8 @@ import pytest
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.distances import BLOCK_S, DistanceLog, nearest_separations_m
 from quad_nav.sim.movers import Movers
-from quad_nav.sim.scene import Cylinder, Scene, Walls
+from quad_nav.sim.obstacles import Cylinder
+from quad_nav.sim.scene import Scene, Walls
 
 RADIUS_M = 0.3
 

@@ -10,8 +10,9 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.sim.body import World
 from quad_nav.sim.flight import Airframe, BodyState, FlightLaw, FlightParams
 from quad_nav.sim.free_flight import FreeFlight
+from quad_nav.sim.obstacles import Cylinder
 from quad_nav.sim.rigid_body import step_freely
-from quad_nav.sim.scene import Cylinder, Scene, Walls
+from quad_nav.sim.scene import Scene, Walls
 from quad_nav.sim.simulation import Simulation
 from quad_nav.sim.simulation_params import STEP_S, SimulationParams
 

@@ -17,8 +17,9 @@ from quad_nav.sim.casters import KernelCaster, WorldCaster
 from quad_nav.sim.flight import Airframe, BodyState
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.lidar_kernel import Beams, SolidGrid, Solids, cast_scans
+from quad_nav.sim.obstacles import Box, Cylinder
 from quad_nav.sim.rays import BOX, CYLINDER, SPHERE
-from quad_nav.sim.scene import Box, Cylinder, Scene, Walls
+from quad_nav.sim.scene import Scene, Walls
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.sim.simulation import Simulation
 from quad_nav.sim.simulation_params import SimulationParams

@@ -5,7 +5,7 @@ from moving_cart import cart, scene_with
 
 from quad_nav.errors import InputError
 from quad_nav.sim.motion import LINEAR, SPLINE, Motion, Walkers
-from quad_nav.sim.scene import Box, Cylinder, Sphere
+from quad_nav.sim.obstacles import Box, Cylinder, Sphere
 from quad_nav.sim.scene_file import load_scene, scene_from_document
 from quad_nav.sim.scene_writer import scene_document, write_scene
 

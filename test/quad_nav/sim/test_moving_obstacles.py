@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.patches import Circle
+from matplotlib.patches import Polygon
 from moving_cart import cart, scene_with
 
 from quad_nav.offline.run import fly
@@ -21,7 +21,8 @@ from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.motion import SPLINE, Motion
 from quad_nav.sim.movers import Movers
-from quad_nav.sim.scene import Box, Cylinder, MovingObstacle, Sphere
+from quad_nav.sim.obstacles import Box, Cylinder, Sphere
+from quad_nav.sim.scene import MovingObstacle
 from quad_nav.sim.simulation import Simulation
 from quad_nav.sim.simulation_params import STEPS_PER_S, SimulationParams
 from quad_nav.topics.markers import CYLINDER, OBSTACLES_TOPIC, moving_markers
@@ -167,7 +168,8 @@ def test_recordings_have_the_obstacles_and_reports_show_them(tmp_path):
         position = sent[k].content.markers[0].pose.position
         assert (position.x, position.y) == pytest.approx((x_m, y_m))
     figure = paths_picture(flown_paths(trace, resampled_tracks(trace), []))
-    drawn = [patch.center for patch in figure.axes[0].patches if isinstance(patch, Circle)]
-    assert any(at == pytest.approx(movers.poses(2.0)[0, :2]) for at in drawn)
+    drawn = [patch for patch in figure.axes[0].patches if isinstance(patch, Polygon)]
+    middles = [patch.get_xy()[:-1].mean(axis=0) for patch in drawn]
+    assert any(at == pytest.approx(movers.poses(2.0)[0, :2]) for at in middles)
     animate_flight(trace, tmp_path / "flight.gif")
     assert (tmp_path / "flight.gif").stat().st_size > 1000

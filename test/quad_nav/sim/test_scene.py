@@ -10,7 +10,8 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
-from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Scene, Sphere, Walls
+from quad_nav.sim.obstacles import Box, Cylinder, Sphere
+from quad_nav.sim.scene import BODY_RADIUS_M, Scene, Walls
 from quad_nav.sim.scene_file import load_scene, scene_from_document
 from quad_nav.sim.scene_writer import write_scene
 
@@ -217,9 +218,9 @@ def test_all_faults_are_listed_at_once():
         "s.yaml: obstacles[0].centre[1]: nan, expected a finite number",
         "s.yaml: obstacles[0].size[1]: -1.0, expected a number above 0",
         "s.yaml: obstacles[1].shape: 'cone', expected box, cylinder or sphere",
+        "s.yaml: obstacles[2].radius: True, expected a number above 0",
         "s.yaml: obstacles[2].height: 'high', expected a number above 0",
         "s.yaml: obstacles[2].bottom: -1 m is below the floor, expected 0 or more",
-        "s.yaml: obstacles[2].radius: True, expected a number above 0",
         "s.yaml: starts[1]: a list of 1, expected [x, y] or [x, y, yaw]",
         "s.yaml: starts[0]: (9, 1) is outside the arena, expected 0 < x < 4 and 0 < y < 6",
     ]

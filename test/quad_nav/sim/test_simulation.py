@@ -14,7 +14,8 @@ from quad_nav.sim.body import World
 from quad_nav.sim.contacts import CONTACT_GAP_S, ContactLog, Touch
 from quad_nav.sim.flight import Airframe
 from quad_nav.sim.lidar import LidarParams
-from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Scene, Sphere, Walls
+from quad_nav.sim.obstacles import Box, Cylinder, Sphere
+from quad_nav.sim.scene import BODY_RADIUS_M, Scene, Walls
 from quad_nav.sim.simulation import Simulation
 from quad_nav.sim.simulation_params import LIDAR_CASTERS, STEPS_PER_S, SimulationParams
 

@@ -8,7 +8,8 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
-from quad_nav.sim.scene import Cylinder, Scene, Walls
+from quad_nav.sim.obstacles import Cylinder
+from quad_nav.sim.scene import Scene, Walls
 from quad_nav.sim.start_poses import start_poses
 
 MIDDLE = Pose2D(10.0, 10.0, 0.0)

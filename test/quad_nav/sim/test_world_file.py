@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from quad_nav.errors import InputError
-from quad_nav.sim.scene import Box, Cylinder, Sphere
+from quad_nav.sim.obstacles import Box, Cylinder, Sphere
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.sim.world_file import load_world
 

@@ -14,7 +14,8 @@ from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.goal_file import GoalSequence
 from quad_nav.mission.sequencer import Sequencer
-from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Scene, Sphere, Walls
+from quad_nav.sim.obstacles import Box, Cylinder, Sphere
+from quad_nav.sim.scene import BODY_RADIUS_M, Scene, Walls
 from quad_nav.sim.scene_file import load_scene, scene_from_document
 from quad_nav.sim.scene_writer import scene_document
 from quad_nav.topics.goal_routing import GoalRouter, Route, selection_markers

@@ -1,0 +1,360 @@
+"""Shapes of obstacles. What a shape is, it says itself; drawings take its outline and height.
+
+The physics engine (``body``), the LIDAR's kernel (``rays``) and RViz (``topics.markers``) have a
+table each by ``Obstacle.shape``, and fail with a ``KeyError`` at a shape that they do not know.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Callable, ClassVar, Dict, Mapping, Sequence, Tuple, Type, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.files.document import Checker
+from quad_nav.geometry import Coordinate, Pose2D, rotate_vectors
+
+Floats = NDArray[np.float64]
+Triple = Tuple[float, float, float]
+
+ROUND_CORNERS = 32
+"""Corners of the outline of a round obstacle."""
+
+
+class Obstacle(ABC):
+    """Upright obstacle with its centre at (x, y), a frozen dataclass. Lengths in metres.
+
+    Attributes:
+        shape: Name of the shape in scene files.
+        keys: Keys of a scene file that the shape has beside name, shape, centre and motion.
+        name: Unique in a scene.
+        bottom_m: Height of the lowest point above the floor.
+        height_m: Distance from the lowest to the highest point.
+        yaw_rad: Rotation about the vertical axis; 0 for what looks the same from all sides.
+    """
+
+    shape: ClassVar[str]
+    keys: ClassVar[Sequence[str]]
+    name: str
+    x_m: float
+    y_m: float
+    bottom_m: float
+    height_m: float
+    yaw_rad: float = 0.0
+
+    @classmethod
+    @abstractmethod
+    def read(
+        cls, check: Checker, entry: Dict[str, Any], place: str, name: str, x_m: float, y_m: float
+    ) -> Obstacle:
+        """Read the shape's own keys of an obstacle in a scene file; ``check`` gets the faults."""
+
+    @abstractmethod
+    def values(self) -> Dict[str, Any]:
+        """Return the values of the shape's own keys, without ``bottom``."""
+
+    @property
+    @abstractmethod
+    def half_m(self) -> Triple:
+        """Half of the extent along the obstacle's own x, y and z."""
+
+    @property
+    @abstractmethod
+    def reach_m(self) -> float:
+        """Radius of an upright cylinder around the centre that holds the obstacle."""
+
+    @abstractmethod
+    def corners_m(self, count: int = ROUND_CORNERS) -> Floats:
+        """Return the outline from above in the obstacle's frame, float64[k, 2], counter-clockwise.
+
+        Args:
+            count: Number of corners of a round outline.
+        """
+
+    @abstractmethod
+    def surface_distance_m(self, x_m: Coordinate, y_m: Coordinate, z_m: float) -> Any:
+        """Return the distance from a point, or from each of many, to the surface.
+
+        Args:
+            x_m: Number or float64[...], in ``map``.
+            y_m: Of the same shape.
+            z_m: Height above the floor.
+
+        Returns:
+            Of the same shape; negative inside the obstacle.
+        """
+
+    @classmethod
+    def distances_to(cls, obstacles: Sequence[Any]) -> Callable[[float, float, float], Floats]:
+        """Return a function of (x, y, z) for ``surface_distance_m`` of many of this shape.
+
+        Its result is float64[n]. A shape that scenes have thousands of has a faster one.
+        """
+        return lambda x_m, y_m, z_m: np.array(
+            [one.surface_distance_m(x_m, y_m, z_m) for one in obstacles]
+        )
+
+    @property
+    def top_m(self) -> float:
+        """Height of the highest point above the floor."""
+        return self.bottom_m + self.height_m
+
+    @property
+    def centre_m(self) -> Triple:
+        """Centre (x, y, z) in ``map``."""
+        return (self.x_m, self.y_m, self.bottom_m + self.height_m / 2)
+
+    def crosses(self, altitude_m: float) -> bool:
+        """Return whether the obstacle is in the way at an altitude, not above or below it."""
+        return self.bottom_m <= altitude_m <= self.top_m
+
+    def outline_m(self, count: int = ROUND_CORNERS) -> Floats:
+        """Return the closed outline from above in ``map``, float64[k, 2]; see ``corners_m``."""
+        corners = self.corners_m(count)
+        pose = Pose2D(self.x_m, self.y_m, self.yaw_rad)
+        return pose.transform_points(np.concatenate([corners, corners[:1]]))
+
+    def placed(self, pose: Sequence[float]) -> Obstacle:
+        """Return the obstacle at a pose (x_m, y_m, yaw_rad) in ``map``."""
+        x_m, y_m, yaw_rad = map(float, pose)
+        turns = any(one.name == "yaw_rad" for one in fields(cast(Any, self)))
+        return self.changed(x_m=x_m, y_m=y_m, **({"yaw_rad": yaw_rad} if turns else {}))
+
+    def changed(self, **changes: Any) -> Obstacle:
+        """Return the obstacle with other values of some fields."""
+        changed: Obstacle = replace(cast(Any, self), **changes)
+        return changed
+
+    def document(self) -> Dict[str, Any]:
+        """Return the entry of a scene file that ``read`` makes an equal obstacle of."""
+        return {
+            "name": self.name,
+            "centre": [self.x_m, self.y_m],
+            "shape": self.shape,
+            **self.values(),
+            **({"bottom": self.bottom_m} if self.bottom_m else {}),
+        }
+
+
+@dataclass(frozen=True)
+class Box(Obstacle):
+    """Upright box with its centre at (x, y), rotated by ``yaw_rad`` about its vertical axis."""
+
+    shape = "box"
+    keys = ("size", "height", "yaw", "bottom")
+
+    name: str
+    x_m: float
+    y_m: float
+    size_x_m: float
+    size_y_m: float
+    height_m: float
+    yaw_rad: float = 0.0
+    bottom_m: float = 0.0
+
+    @classmethod
+    def read(
+        cls, check: Checker, entry: Dict[str, Any], place: str, name: str, x_m: float, y_m: float
+    ) -> Box:
+        """Read the shape's own keys; see ``Obstacle.read``."""
+        size_x_m, size_y_m = check.numbers(entry, "size", place, 2, positive=True)
+        height_m, bottom_m = _read_upright(check, entry, place)
+        yaw_rad = check.number(entry, "yaw", place, 0.0)
+        return cls(name, x_m, y_m, size_x_m, size_y_m, height_m, yaw_rad, bottom_m)
+
+    def values(self) -> Dict[str, Any]:
+        """Return the values of the shape's own keys, without ``bottom``."""
+        size = [self.size_x_m, self.size_y_m]
+        return {"size": size, "yaw": self.yaw_rad, "height": self.height_m}
+
+    @property
+    def half_m(self) -> Triple:
+        """Half of the extent along the obstacle's own x, y and z."""
+        return (self.size_x_m / 2, self.size_y_m / 2, self.height_m / 2)
+
+    @property
+    def reach_m(self) -> float:
+        """Radius of an upright cylinder around the centre that holds the obstacle."""
+        return math.hypot(self.size_x_m, self.size_y_m) / 2
+
+    def corners_m(self, count: int = ROUND_CORNERS) -> Floats:
+        """Return the outline from above in the obstacle's frame; see ``Obstacle.corners_m``."""
+        x_m, y_m, _ = self.half_m
+        return np.array([(x_m, y_m), (-x_m, y_m), (-x_m, -y_m), (x_m, -y_m)])
+
+    def surface_distance_m(self, x_m: Coordinate, y_m: Coordinate, z_m: float) -> Any:
+        """Return the distance to the surface; see ``Obstacle.surface_distance_m``."""
+        x, y = Pose2D(self.x_m, self.y_m, self.yaw_rad).inverse_transform(x_m, y_m)
+        outside = (
+            np.abs(x) - self.size_x_m / 2.0,
+            np.abs(y) - self.size_y_m / 2.0,
+            _outside_slab(z_m, self.bottom_m, self.height_m),
+        )
+        return _signed_distance(outside)
+
+    @classmethod
+    def distances_to(cls, obstacles: Sequence[Box]) -> Callable[[float, float, float], Floats]:
+        """Return a function for the distances to many boxes; a map has thousands."""
+        centres = np.array([box.centre_m for box in obstacles])
+        halves = np.array([[box.size_x_m, box.size_y_m, box.height_m] for box in obstacles]) / 2
+        cos = np.array([math.cos(box.yaw_rad) for box in obstacles])
+        sin = np.array([math.sin(box.yaw_rad) for box in obstacles])
+
+        def distances_m(x_m: float, y_m: float, z_m: float) -> Floats:
+            dx, dy, dz = ((x_m, y_m, z_m) - centres).T
+            local = (*rotate_vectors(cos, -sin, dx, dy), dz)
+            outside = np.abs(local).T - halves
+            distances: Floats = _signed_distance((outside[:, 0], outside[:, 1], outside[:, 2]))
+            return distances
+
+        return distances_m
+
+
+class _Round(Obstacle):
+    """Obstacle that is round from above."""
+
+    radius_m: float
+
+    @property
+    def reach_m(self) -> float:
+        """Radius of an upright cylinder around the centre that holds the obstacle."""
+        return self.radius_m
+
+    def corners_m(self, count: int = ROUND_CORNERS) -> Floats:
+        """Return the outline from above in the obstacle's frame; see ``Obstacle.corners_m``."""
+        angles = np.linspace(0.0, 2 * np.pi, count + 1)[:-1]
+        return self.radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+@dataclass(frozen=True)
+class Cylinder(_Round):
+    """Upright cylinder with its axis at (x, y)."""
+
+    shape = "cylinder"
+    keys = ("radius", "height", "bottom")
+
+    name: str
+    x_m: float
+    y_m: float
+    radius_m: float
+    height_m: float
+    bottom_m: float = 0.0
+
+    @classmethod
+    def read(
+        cls, check: Checker, entry: Dict[str, Any], place: str, name: str, x_m: float, y_m: float
+    ) -> Cylinder:
+        """Read the shape's own keys; see ``Obstacle.read``."""
+        radius_m = check.number(entry, "radius", place, positive=True)
+        return cls(name, x_m, y_m, radius_m, *_read_upright(check, entry, place))
+
+    def values(self) -> Dict[str, Any]:
+        """Return the values of the shape's own keys, without ``bottom``."""
+        return {"radius": self.radius_m, "height": self.height_m}
+
+    @property
+    def half_m(self) -> Triple:
+        """Half of the extent along the obstacle's own x, y and z."""
+        return (self.radius_m, self.radius_m, self.height_m / 2)
+
+    def surface_distance_m(self, x_m: Coordinate, y_m: Coordinate, z_m: float) -> Any:
+        """Return the distance to the surface; see ``Obstacle.surface_distance_m``."""
+        outside = (
+            np.hypot(x_m - self.x_m, y_m - self.y_m) - self.radius_m,
+            _outside_slab(z_m, self.bottom_m, self.height_m),
+        )
+        return _signed_distance(outside)
+
+    @classmethod
+    def distances_to(cls, obstacles: Sequence[Cylinder]) -> Callable[[float, float, float], Floats]:
+        """Return a function for the distances to many cylinders; a wood has hundreds."""
+        centres = np.array([one.centre_m for one in obstacles])
+        radii = np.array([one.radius_m for one in obstacles])
+        half_heights = np.array([one.height_m / 2 for one in obstacles])
+
+        def distances_m(x_m: float, y_m: float, z_m: float) -> Floats:
+            dx, dy, dz = ((x_m, y_m, z_m) - centres).T
+            outside = (np.hypot(dx, dy) - radii, np.abs(dz) - half_heights)
+            distances: Floats = _signed_distance(outside)
+            return distances
+
+        return distances_m
+
+
+@dataclass(frozen=True)
+class Sphere(_Round):
+    """Sphere with its centre at (x, y, z)."""
+
+    shape = "sphere"
+    keys = ("radius", "bottom")
+
+    name: str
+    x_m: float
+    y_m: float
+    z_m: float
+    radius_m: float
+    bottom_m: float = field(init=False, repr=False, compare=False)
+    height_m: float = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bottom_m", self.z_m - self.radius_m)
+        object.__setattr__(self, "height_m", 2.0 * self.radius_m)
+
+    @classmethod
+    def read(
+        cls, check: Checker, entry: Dict[str, Any], place: str, name: str, x_m: float, y_m: float
+    ) -> Sphere:
+        """Read the shape's own keys; see ``Obstacle.read``."""
+        radius_m = check.number(entry, "radius", place, positive=True)
+        bottom_m = check.number(entry, "bottom", place, 0.0)
+        if bottom_m + 2 * radius_m <= 0.0:
+            problem = f"{bottom_m:g} m puts the obstacle below the floor, expected a higher one"
+            check.fault(f"{place}.bottom", problem)
+        return cls(name, x_m, y_m, bottom_m + radius_m, radius_m)
+
+    def values(self) -> Dict[str, Any]:
+        """Return the values of the shape's own keys, without ``bottom``."""
+        return {"radius": self.radius_m}
+
+    @property
+    def half_m(self) -> Triple:
+        """Half of the extent along the obstacle's own x, y and z."""
+        return (self.radius_m, self.radius_m, self.radius_m)
+
+    def surface_distance_m(self, x_m: Coordinate, y_m: Coordinate, z_m: float) -> Any:
+        """Return the distance to the surface; see ``Obstacle.surface_distance_m``."""
+        dx, dy, dz = x_m - self.x_m, y_m - self.y_m, z_m - self.z_m
+        return np.sqrt(dx * dx + dy * dy + dz * dz) - self.radius_m
+
+
+SHAPES: Mapping[str, Type[Obstacle]] = {one.shape: one for one in (Box, Cylinder, Sphere)}
+
+
+def _read_upright(check: Checker, entry: Dict[str, Any], place: str) -> Tuple[float, float]:
+    """Return height and bottom of an obstacle in a scene file that stands or hangs."""
+    height_m = check.number(entry, "height", place, positive=True)
+    bottom_m = check.number(entry, "bottom", place, 0.0)
+    if bottom_m < 0.0:
+        check.fault(f"{place}.bottom", f"{bottom_m:g} m is below the floor, expected 0 or more")
+    return height_m, bottom_m
+
+
+def _outside_slab(z_m: float, bottom_m: float, height_m: float) -> float:
+    """Return the distance of z from a horizontal slab; negative inside."""
+    return max(bottom_m - z_m, z_m - bottom_m - height_m)
+
+
+def _signed_distance(outside_m: Tuple[Any, ...]) -> Any:
+    """Return the distance to a product of intervals from the distances to each interval.
+
+    Outside, the distance is the norm of the positive parts. Inside, it is that to the nearest
+    face.
+    """
+    distance_m = np.sqrt(sum(np.maximum(d, 0.0) ** 2 for d in outside_m))
+    deepest_m = outside_m[0]
+    for d in outside_m[1:]:
+        deepest_m = np.maximum(deepest_m, d)
+    return np.where(distance_m > 0.0, distance_m, deepest_m)[()]
