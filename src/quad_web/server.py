@@ -246,7 +246,7 @@ def _nicegui_app(nicegui: Any, state: FleetState, actions: Actions, options: Web
     def _index() -> None:
         role = nicegui.context.client.request.scope[ROLE]
         nicegui.ui.add_head_html(_HIDE_TOKEN)
-        page.build_page(state, actions if role is Role.STEER else WatchOnly(actions), role)
+        page.Page(state, actions if role is Role.STEER else WatchOnly(actions), role)
 
     return nicegui.app
 

@@ -56,7 +56,7 @@ def test_the_mission_waits_at_its_start(hall):
     assert plan_end(state) == [7.0, 3.5]
     assert state.item("global_costmap/1").arrays["costs"].max() == 100
     assert [row["gap_m"] > 5.0 for row in state.item("status").data["rows"]] == [True, True]
-    for refused in (mission.start(), mission.stop_all(), mission.cancel(0)):
+    for refused in (mission.call("start"), mission.call("stop_all"), mission.call("cancel", 0)):
         assert not refused.ok and "the flight has not begun" in refused.text
 
 

@@ -11,8 +11,8 @@ import pytest
 from page_without_browser import Recorded, fleet
 
 from quad_web import page_client
-from quad_web.page_client import LABELS, NOT_HERE, READS, WATCHES, PageClient
-from quad_web.view.actions import Actions, Answer, Role
+from quad_web.page_client import NOT_HERE, WATCHES, PageClient
+from quad_web.view.actions import LABELS, Answer, Role
 
 WEB = Path(page_client.__file__).parent
 
@@ -20,11 +20,6 @@ WEB = Path(page_client.__file__).parent
 def made(role=Role.STEER, actions=None):
     shown = []
     return PageClient(fleet(), actions or Recorded(), role, shown.append), shown
-
-
-def test_every_method_of_actions_is_an_action_or_a_read():
-    methods = {name for name in vars(Actions) if not name.startswith("_")} - {"available"}
-    assert methods == {*LABELS, *READS}
 
 
 def test_an_action_is_called_shown_and_logged():

@@ -15,11 +15,11 @@ const PAN_PX = 60;
 const PANS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /** The arena in an element of the page. */
-export class ArenaView {
+export class View {
   /**
    * @param {HTMLElement} root
    * @param {(name: string, value: any) => void} emit Tells Python: select, goal, edit, tool, mode,
-   *   link.
+   *   follow.
    */
   constructor(root, emit) {
     this.emit = emit;
@@ -69,14 +69,7 @@ export class ArenaView {
     };
     document.addEventListener("keydown", this._onEscape, { capture: true });
     this._onFrame = () => this._draw();
-    this._onState = ({ detail: { isAlive } }) => {
-      if (isAlive !== this._wasAlive) {
-        this._wasAlive = isAlive;
-        this.emit("link", isAlive);
-      }
-    };
     this._link.addEventListener("frame", this._onFrame);
-    this._link.addEventListener("state", this._onState);
     this._onVisible = () => this.requestDraw();
     document.addEventListener("visibilitychange", this._onVisible);
     this._resizes = new ResizeObserver(() => this._resize());
@@ -90,7 +83,6 @@ export class ArenaView {
     document.removeEventListener("keydown", this._onEscape, { capture: true });
     document.removeEventListener("visibilitychange", this._onVisible);
     this._link.removeEventListener("frame", this._onFrame);
-    this._link.removeEventListener("state", this._onState);
     for (const view of Object.values(this._views)) {
       view.dispose?.();
     }
@@ -119,9 +111,9 @@ export class ArenaView {
       this.editing = state.editing && { faults: [], ...state.editing };
     }
     if (state.tool !== undefined) {
-      this._setTool(this._role === "steer" ? state.tool : "view");
+      this._setTool(this._role === "steer" && this._tools[state.tool] ? state.tool : "view");
     }
-    if (state.mode !== undefined && state.mode !== this._mode) {
+    if (["2d", "3d"].includes(state.mode) && state.mode !== this._mode) {
       this._setMode(state.mode);
     }
     if (state.following !== undefined) {

@@ -69,7 +69,7 @@ export function fleetOf(store, choices) {
       : [];
   return {
     scene,
-    sceneRevision: store.revision("scene"),
+    sceneRevision: store.get("scene")?.revision ?? 0,
     obstacles: obstaclesOf(store, scene),
     altitude: scene?.altitude_m ?? 1,
     selected: robots.get(choices.selected) ?? null,
@@ -105,14 +105,8 @@ function robotsOf(store, looks) {
         name: looks.names[index] ?? String(index),
         colour: looks.colours[index] ?? INK.limited,
         radius: looks.radius_m || DEFAULT_RADIUS_M,
-        footprint: looks.footprint ?? null,
         state: rows.get(index)?.state ?? "",
-        x,
-        y,
-        z,
-        roll,
-        pitch,
-        yaw,
+        ...{ x, y, z, roll, pitch, yaw },
       });
     }
   }

@@ -3,11 +3,10 @@
  */
 
 import { boundsOf } from "./fleet.js";
-import { drawContacts, drawGoals, drawYields } from "./map_marks.js";
+import { drawContacts, drawGoals, drawTracks, drawYields } from "./map_marks.js";
 import { drawCells, drawPaths, drawScans } from "./map_paths.js";
 import { drawNumbers, drawRobot, drawnRadius } from "./map_robots.js";
 import { CostmapImages, drawCostmaps, drawFloor, drawObstacles, drawSolids } from "./map_scene.js";
-import { drawTracks } from "./map_tracks.js";
 import { Viewport } from "./viewport.js";
 
 const LEAST_SHARE = 0.8; // of the scale, for panels that stay free
@@ -126,7 +125,7 @@ export class MapView {
     context.setTransform(this._ratio, 0, 0, this._ratio, 0, 0);
     drawObstacles(context, viewport, fleet.obstacles, fleet.altitude);
     drawCells(context, viewport, fleet.cells);
-    drawTracks(context, viewport, fleet.tracks);
+    drawTracks(context, toScreen, fleet.tracks);
     drawPaths(context, viewport, fleet);
     drawGoals(context, toScreen, fleet.goals, fleet.selected !== null);
     drawScans(context, viewport, fleet.scans);

@@ -2,6 +2,18 @@
  * Projection of the map view: metres in `map` (x right, y up) to CSS pixels (y down).
  */
 
+/** Pixels of what the view cannot show. */
+export const OUTSIDE = [-1e4, -1e4];
+
+/** Trace a line through places in pixels; those outside interrupt it. */
+export function tracePath(context, places) {
+  context.beginPath();
+  places.forEach((place, i) => {
+    const isSeen = i > 0 && place !== OUTSIDE && places[i - 1] !== OUTSIDE;
+    isSeen ? context.lineTo(...place) : context.moveTo(...place);
+  });
+}
+
 const LEAST_SCALE = 1; // pixels per metre
 const GREATEST_SCALE = 2000;
 
