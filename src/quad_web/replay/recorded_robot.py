@@ -136,10 +136,7 @@ class RobotTrack:
             self._state(time_s),
             right.decision,
             right.limited_by,
-            is_done=bool(goals)
-            and leg is not None
-            and not is_active
-            and leg.index + 1 >= len(goals),
+            is_done=is_done,
             is_lost=age_s > LOST_AFTER_S,
             goal=leg.index + 1 if leg is not None and is_active else None,
             goals=len(goals) or None,
