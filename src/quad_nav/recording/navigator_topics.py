@@ -69,9 +69,8 @@ class NavigatorTopics:
             self._write(topic.name, stamp, content, latched=topic.is_latched)
         self._write_obstacles(tick.now_s, stamp)
         if tick.command is not None:
-            self._topics.write(
-                self._command_topic, stamp, messages.command(tick.command), self._node
-            )
+            command = messages.command(tick.command)
+            self._topics.write(self._command_topic, stamp, command, self._node)
         self._write_plans(tick, stamp)
         if tick.recovery is not None:
             self._write_recovery(tick.recovery, poses.in_global, stamp)
@@ -131,43 +130,28 @@ class NavigatorTopics:
     def _write_recovery(self, start: RecoveryStart, pose: Pose2D, stamp: int) -> None:
         frame = self._navigator.global_costmap.params.global_frame
         at = messages.pose_stamped(messages.planar_pose(pose), frame, stamp)
-        self._write(
-            "recovery_status",
-            stamp,
-            messages.message(
-                "move_base_msgs/RecoveryStatus", at, start.index, start.total, start.name
-            ),
-        )
+        told = (at, start.index, start.total, start.name)
+        content = messages.message("move_base_msgs/RecoveryStatus", *told)
+        self._write("recovery_status", stamp, content)
 
     def _write_costmap(self, name: str, window: Window, pose: Pose2D, now_s: float) -> None:
         """Write the full grid, latched, at the first update, and changes at the costmap's rate."""
         costmap, updates = self._costmaps[name]
         frame, stamp = costmap.params.global_frame, stamp_at(now_s)
-        self._write(
-            f"{name}_costmap/footprint",
-            stamp,
-            messages.polygon(oriented(costmap.footprint, pose), frame, stamp),
-        )
+        footprint = messages.polygon(oriented(costmap.footprint, pose), frame, stamp)
+        self._write(f"{name}_costmap/footprint", stamp, footprint)
         is_due, is_first = updates.add(now_s, window), name not in self._published
         if not is_due and not is_first:
             return
         self._published[name] = True
         changed = updates.pop()
         if updates.pop_full_grid():
-            self._write(
-                f"{name}_costmap/costmap",
-                stamp,
-                messages.occupancy_grid(costmap.spec, costmap.costs, frame, stamp),
-                latched=True,
-            )
+            grid = messages.occupancy_grid(costmap.spec, costmap.costs, frame, stamp)
+            self._write(f"{name}_costmap/costmap", stamp, grid, latched=True)
         elif not changed.is_empty:
-            self._write(
-                f"{name}_costmap/costmap_updates",
-                stamp,
-                messages.grid_update(
-                    costmap.costs[changed.slices], changed.x0, changed.y0, frame, stamp
-                ),
-            )
+            corner = changed.x0, changed.y0
+            part = messages.grid_update(costmap.costs[changed.slices], *corner, frame, stamp)
+            self._write(f"{name}_costmap/costmap_updates", stamp, part)
 
     def _write(self, name: str, stamp: int, content: Any, latched: bool = False) -> None:
         self._topics.write(f"{self._node}/{name}", stamp, content, self._node, latched)

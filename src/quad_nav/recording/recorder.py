@@ -70,22 +70,11 @@ class Recorder(FlightObserver):
         self._paths = [FlownPath(_path_pose) for _ in flight.robots]
         self._write_flight()
         count = len(flight.robots)
-        self._write(
-            "/simulation/scene",
-            START_NS,
-            messages.marker_array(scene_markers(flight.setup.scene)),
-            _SIMULATOR,
-            latched=True,
-        )
-        self._write(
-            "/simulation/quadcopters",
-            START_NS,
-            messages.marker_array(
-                [*quadcopter_markers(count), *number_markers(count, flight.setup.scene)]
-            ),
-            _SIMULATOR,
-            latched=True,
-        )
+        scene = messages.marker_array(scene_markers(flight.setup.scene))
+        self._write("/simulation/scene", START_NS, scene, _SIMULATOR, latched=True)
+        bodies = [*quadcopter_markers(count), *number_markers(count, flight.setup.scene)]
+        shown = messages.marker_array(bodies)
+        self._write("/simulation/quadcopters", START_NS, shown, _SIMULATOR, latched=True)
         self._write_goals(0.0)
         self.on_move(flight)
 
@@ -98,28 +87,20 @@ class Recorder(FlightObserver):
     def on_scan(self, robot: int, scan: Scan, map_from_lidar: Pose3D) -> None:
         """Write a LIDAR scan."""
         stamp = stamp_at(scan.stamp_s)
-        self._write(
-            f"/scan{robot}", stamp, messages.laser_scan(scan, f"Lidar{robot}", stamp), _SIMULATOR
-        )
+        content = messages.laser_scan(scan, f"Lidar{robot}", stamp)
+        self._write(f"/scan{robot}", stamp, content, _SIMULATOR)
 
     def on_move(self, flight: Flight) -> None:
         """Write clock, transforms, odometry and paths of one step."""
         now_s, stamp = flight.now_s, stamp_at(flight.now_s)
         self._write("/clock", stamp, messages.clock(stamp), _SIMULATOR, latched=True)
-        self._write(
-            "/tf",
-            stamp,
-            messages.message(
-                "tf2_msgs/TFMessage",
-                [
-                    transform
-                    for robot, state in enumerate(flight.states)
-                    for transform in self._transforms(robot, state.map_from_base, stamp)
-                ],
-            ),
-            _SIMULATOR,
-            latched=True,
-        )
+        transforms = [
+            transform
+            for robot, state in enumerate(flight.states)
+            for transform in self._transforms(robot, state.map_from_base, stamp)
+        ]
+        moved = messages.message("tf2_msgs/TFMessage", transforms)
+        self._write("/tf", stamp, moved, _SIMULATOR, latched=True)
         if now_s >= self._obstacles_s + OBSTACLES_PERIOD_S - 1e-6:
             self._write_obstacles(flight)
         for robot, state in enumerate(flight.states):
@@ -204,13 +185,8 @@ class Recorder(FlightObserver):
     def _write_goals(self, now_s: float) -> None:
         sequencers = [robot.sequencer for robot in self._flight.robots]
         markers = goal_markers(sequencers, self._flight.setup.scene.altitude_m)
-        self._write(
-            "/goals",
-            stamp_at(now_s),
-            messages.marker_array(markers, replaces_all=True),
-            _SEQUENCER,
-            latched=True,
-        )
+        shown = messages.marker_array(markers, replaces_all=True)
+        self._write("/goals", stamp_at(now_s), shown, _SEQUENCER, latched=True)
 
     def _write(
         self, topic: str, stamp: int, content: Any, node: str, latched: bool = False

@@ -109,12 +109,10 @@ def _cells(column: Column, flights: Sequence[FlightMetrics], comparable: bool) -
     if not comparable or len(set(texts)) < 2 or len(known) < 2:
         return list(map(Cell, texts))
     best = column.prefers(known)
+    counts = [flight.success or not column.only_completed for flight in flights]
     return [
-        Cell(
-            text,
-            text != "–" and float(text) == best and (flight.success or not column.only_completed),
-        )
-        for flight, text in zip(flights, texts)
+        Cell(text, text != "–" and float(text) == best and does_count)
+        for text, does_count in zip(texts, counts)
     ]
 
 
@@ -182,16 +180,9 @@ def _metrics_picture(flights: Sequence[FlightMetrics]) -> Figure:
         if column.title in _COUNTS:
             axes.yaxis.get_major_locator().set_params(integer=True)
             axes.set_ylim(bottom=-0.3, top=max(axes.get_ylim()[1], 1.3))
-    robot_legend(
-        figure,
-        (),
-        [
-            Line2D([], [], ls="", marker="o", color=colour(0), label="successful flight"),
-            Line2D(
-                [], [], ls="", marker="X", ms=8, color=ALARM, mec="white", label="failed flight"
-            ),
-        ],
-    )
+    good = Line2D([], [], ls="", marker="o", color=colour(0), label="successful flight")
+    bad = Line2D([], [], ls="", marker="X", ms=8, color=ALARM, mec="white", label="failed flight")
+    robot_legend(figure, (), [good, bad])
     return figure
 
 

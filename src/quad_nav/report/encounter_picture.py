@@ -57,28 +57,21 @@ def _draw_frame(
     axes: Axes, trace: FlightTrace, tracks: Tracks, encounter: Encounter, time_s: float
 ) -> None:
     now = tracks.index_at(time_s)
-    shown = (
-        encounter.x_m - _HALF_SIZE_M,
-        encounter.x_m + _HALF_SIZE_M,
-        encounter.y_m - _HALF_SIZE_M,
-        encounter.y_m + _HALF_SIZE_M,
-    )
+    x_m, y_m, half_m = encounter.x_m, encounter.y_m, _HALF_SIZE_M
+    shown = (x_m - half_m, x_m + half_m, y_m - half_m, y_m + half_m)
     draw_scene(axes, trace.scene, shown)
     draw_moving(axes, trace, time_s)
     offsets_m = np.abs(tracks.positions_m[:, now] - (encounter.x_m, encounter.y_m)).max(axis=1)
     for k in np.flatnonzero(offsets_m < _HALF_SIZE_M + _NEAR_M):
         _draw_robot(axes, tracks, int(k), now, trace.robot_radius_m)
     nearest = abs(time_s - encounter.time_s) < 1e-9
+    ink = ALARM if nearest else QUIET
     if nearest and encounter.other is None:
         axes.plot(encounter.x_m, encounter.y_m, "X", color=ALARM, mec="white", ms=10, zorder=9)
     axes.set(xlim=shown[:2], ylim=shown[2:], xticks=[], yticks=[])
     axes.set_title(f"{time_s:.1f} s", loc="center", fontsize=9, color=ALARM if nearest else "black")
-    axes.set_xlabel(
-        _gap(trace, tracks, encounter, now, nearest),
-        fontsize=8.5,
-        labelpad=3,
-        color=ALARM if nearest else QUIET,
-    )
+    gap = _gap(trace, tracks, encounter, now, nearest)
+    axes.set_xlabel(gap, fontsize=8.5, labelpad=3, color=ink)
     for spine in axes.spines.values():
         spine.set(visible=True, color=ALARM if nearest else "#a0a8b0", lw=1.8 if nearest else 0.8)
 

@@ -51,16 +51,8 @@ def encounters(
     found = _obstacles_touched(trace)
     for a, b in itertools.combinations(range(len(trace.robots)), 2):
         found += _of_pair(trace, tracks, a, b, below_m)
-    return tuple(
-        sorted(
-            found,
-            key=lambda encounter: (
-                encounter.other is not None,
-                encounter.separation_m,
-                encounter.time_s,
-            ),
-        )
-    )
+    found.sort(key=lambda one: (one.other is not None, one.separation_m, one.time_s))
+    return tuple(found)
 
 
 def separation_text(separation_m: float) -> str:
@@ -84,11 +76,8 @@ def _of_pair(trace: FlightTrace, tracks: Tracks, a: int, b: int, below_m: float)
         if _touched(trace, names, tracks.times_s[first], tracks.times_s[last]):
             nearest_m = 0.0
         x_m, y_m = tracks.positions_m[[a, b], nearest].mean(axis=0)
-        found.append(
-            Encounter(
-                a, b, names, float(tracks.times_s[nearest]), nearest_m, float(x_m), float(y_m)
-            )
-        )
+        time_s = float(tracks.times_s[nearest])
+        found.append(Encounter(a, b, names, time_s, nearest_m, float(x_m), float(y_m)))
     return found
 
 
@@ -119,16 +108,7 @@ def _obstacles_touched(trace: FlightTrace) -> List[Encounter]:
             continue
         pair = (contact.robot, contact.other)
         if contact.time_s - last_s.get(pair, -np.inf) >= SAME_ENCOUNTER_S:
-            found.append(
-                Encounter(
-                    numbers[contact.robot],
-                    None,
-                    pair,
-                    contact.time_s,
-                    0.0,
-                    contact.x_m,
-                    contact.y_m,
-                )
-            )
+            robot, place = numbers[contact.robot], (contact.x_m, contact.y_m)
+            found.append(Encounter(robot, None, pair, contact.time_s, 0.0, *place))
         last_s[pair] = contact.time_s
     return found

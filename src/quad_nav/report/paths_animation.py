@@ -57,20 +57,15 @@ def _obstacle_frames(trace: FlightTrace, times_s: NDArray[np.float64]) -> List[J
 
 def _obstacle_trace(frames: Sequence[Json]) -> List[Json]:
     """Return the trace of the moving obstacles at the end; nothing if there are none."""
-    return [
-        {
-            **last,
-            "type": "scatter",
-            "mode": "lines",
-            "fill": "toself",
-            "fillcolor": MOVING,
-            "opacity": 0.7,
-            "line": {"color": "#7c858e", "width": 1},
-            "name": "moving obstacle",
-            "hoverinfo": "skip",
-        }
-        for last in frames[-1:]
-    ]
+    style = {
+        "fill": "toself",
+        "fillcolor": MOVING,
+        "opacity": 0.7,
+        "line": {"color": "#7c858e", "width": 1},
+        "name": "moving obstacle",
+        "hoverinfo": "skip",
+    }
+    return [{**last, "type": "scatter", "mode": "lines", **style} for last in frames[-1:]]
 
 
 def _robot_traces(tracks: Tracks, flown: Sequence[int]) -> List[Json]:

@@ -129,6 +129,12 @@ def smallest_samples(values: NDArray[np.float64], lines: int) -> NDArray[np.int6
     )
 
 
+def lines(x: Any, y: Any, decimals: Tuple[int, int] = (3, 3), **more: Any) -> Json:
+    """Make a trace of lines; ``more`` are further keys of plotly.js."""
+    xs, ys = (numbers(values, digits) for values, digits in zip((x, y), decimals))
+    return {"type": "scatter", "mode": "lines", "x": xs, "y": ys, **more}
+
+
 def axis(title: str = "", **more: Any) -> Json:
     """Make an axis in the style of the reports; ``more`` are further keys of plotly.js."""
     return {

@@ -20,6 +20,7 @@ from quad_nav.report.plot import (
     axis,
     dash,
     layout,
+    lines,
     numbers,
     plot_text,
     rgb,
@@ -157,39 +158,26 @@ def _scene_traces(scene: Optional[Scene]) -> List[Json]:
             continue
         gap = np.full((1, 2), np.nan)
         points = np.concatenate([part for shape in shapes for part in (shape, gap)])[:-1]
-        found.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "fill": "toself",
-                "name": name,
-                "x": numbers(points[:, 0]),
-                "y": numbers(points[:, 1]),
-                "hoverinfo": "skip",
-                **style,
-            }
-        )
+        more = {"fill": "toself", "name": name, "hoverinfo": "skip", **style}
+        found.append(lines(*points.T, **more))
     return found
 
 
-def _path_trace(path: FlownPath, lines: int) -> Json:
+def _path_trace(path: FlownPath, count: int) -> Json:
     """Return the trace of a path; hovering it shows time, position and speed."""
     robot = path.robot
-    shown = sample(len(robot.times_s), lines)
+    shown = sample(len(robot.times_s), count)
     times_s, speeds_mps = numbers(robot.times_s[shown], 2), numbers(speed_mps(robot)[shown], 2)
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "name": plot_text(path.label),
-        "legendgroup": path.group,
-        "showlegend": bool(path.label),
-        "x": numbers(robot.positions_m[shown, 0]),
-        "y": numbers(robot.positions_m[shown, 1]),
-        "customdata": [list(pair) for pair in zip(times_s, speeds_mps)],
-        "line": {"color": rgb(path.number), "width": 2, "dash": dash(path.number)},
-        "hovertemplate": f"<b>{plot_text(path.hover)}</b><br>%{{customdata[0]:.1f}} s<br>"
+    return lines(
+        *robot.positions_m[shown, :2].T,
+        name=plot_text(path.label),
+        legendgroup=path.group,
+        showlegend=bool(path.label),
+        customdata=[list(pair) for pair in zip(times_s, speeds_mps)],
+        line={"color": rgb(path.number), "width": 2, "dash": dash(path.number)},
+        hovertemplate=f"<b>{plot_text(path.hover)}</b><br>%{{customdata[0]:.1f}} s<br>"
         "(%{x:.2f}, %{y:.2f}) m<br>%{customdata[1]:.2f} m/s<extra></extra>",
-    }
+    )
 
 
 def _marks_trace(marks: Marks, scale: float = 1.0, axis_name: str = "y") -> Json:
@@ -225,54 +213,39 @@ def _marks_trace(marks: Marks, scale: float = 1.0, axis_name: str = "y") -> Json
 
 
 def _panel_traces(panel: Panel, names: Sequence[str], axis_name: str, is_first: bool) -> List[Json]:
-    count = len(panel.curves)
+    count, place = len(panel.curves), {"showlegend": is_first, "yaxis": axis_name}
     found = []
     for robot, (curve, name) in enumerate(zip(panel.curves, map(plot_text, names))):
         if np.isfinite(curve.values).any():
+            width = 1.3 if panel.is_crowded else 2
             found.append(
-                {
-                    **_curve(curve, count, panel.least is not None),
-                    "name": name,
-                    "legendgroup": f"robot{robot}",
-                    "showlegend": is_first,
-                    "yaxis": axis_name,
-                    "opacity": 0.75 if panel.is_crowded else 1.0,
-                    "line": {
-                        "color": rgb(robot),
-                        "width": 1.3 if panel.is_crowded else 2,
-                        "dash": dash(robot),
-                    },
-                    "hovertemplate": f"<b>{name}</b><br>%{{x:.1f}} s<br>"
+                _curve(
+                    curve,
+                    count,
+                    panel.least is not None,
+                    name=name,
+                    legendgroup=f"robot{robot}",
+                    opacity=0.75 if panel.is_crowded else 1.0,
+                    line={"color": rgb(robot), "width": width, "dash": dash(robot)},
+                    hovertemplate=f"<b>{name}</b><br>%{{x:.1f}} s<br>"
                     f"{panel.quantity} %{{y:.2f}} {panel.unit}<extra></extra>",
-                }
+                    **place,
+                )
             )
     if panel.is_crowded and panel.least is not None and np.isfinite(panel.least.values).any():
-        found.append(
-            {
-                **_curve(panel.least, count, True),
-                "name": "smallest of all",
-                "legendgroup": "smallest",
-                "showlegend": is_first,
-                "yaxis": axis_name,
-                "line": {"color": "#000", "width": 2},
-                "hoverinfo": "skip",
-            }
-        )
+        style = {"line": {"color": "#000", "width": 2}, "hoverinfo": "skip", **place}
+        name = "smallest of all"
+        found.append(_curve(panel.least, count, True, name=name, legendgroup="smallest", **style))
     return found + [_marks_trace(marks, axis_name=axis_name) for marks in panel.marks]
 
 
-def _curve(curve: Curve, lines: int, is_distance: bool) -> Json:
-    """Return the points of a curve; those of distances keep their smallest values."""
+def _curve(curve: Curve, count: int, is_distance: bool, **more: Any) -> Json:
+    """Return the trace of a curve; that of a distance keeps its smallest values."""
     if is_distance:
-        shown = smallest_samples(curve.values, lines)
+        shown = smallest_samples(curve.values, count)
     else:
-        shown = sample(len(curve.values), lines)
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "x": numbers(curve.times_s[shown], 2),
-        "y": numbers(curve.values[shown]),
-    }
+        shown = sample(len(curve.values), count)
+    return lines(curve.times_s[shown], curve.values[shown], (2, 3), **more)
 
 
 def _limits(panel: Panel, axis_name: str) -> List[Json]:

@@ -28,34 +28,21 @@ def motion_picture(trace: FlightTrace, shown: Sequence[int]) -> Figure:
         axes.set_title(title)
     for axes in grid[-1]:
         time_axis(axes)
-    robot_legend(
-        figure,
-        (),
-        [
-            Line2D([], [], color=QUIET, lw=2, label="flown"),
-            Line2D([], [], color=_COMMAND, lw=0.8, label="commanded"),
-        ],
-    )
+    flown = Line2D([], [], color=QUIET, lw=2, label="flown")
+    robot_legend(figure, (), [flown, Line2D([], [], color=_COMMAND, lw=0.8, label="commanded")])
     return figure
 
 
 def _draw_robot(row: Sequence[Axes], number: int, robot: RobotTrace) -> None:
     for axes, part in ((row[0], 0), (row[1], 2)):
         axes.plot(robot.times_s, robot.velocities[:, part], color=(*colour(number), 0.6), lw=2.4)
-        _draw_commands(axes, robot, part)
-    row[2].plot(
-        robot.times_s, np.degrees(tilt_rad(robot.quaternions)), color=colour(number), lw=1.2
-    )
+        if len(robot.command_times_s):  # each holds until the next one
+            values = robot.commands[:, part]
+            axes.step(robot.command_times_s, values, where="post", color=_COMMAND, lw=0.7)
+    tilts_deg = np.degrees(tilt_rad(robot.quaternions))
+    row[2].plot(robot.times_s, tilts_deg, color=colour(number), lw=1.2)
     row[2].set_ylim(bottom=0.0)
     row[0].set_ylabel(robot.name, color=colour(number), fontweight="bold")
-
-
-def _draw_commands(axes: Axes, robot: RobotTrace, part: int) -> None:
-    """Draw the commands as steps: each holds until the next one."""
-    if len(robot.command_times_s):
-        axes.step(
-            robot.command_times_s, robot.commands[:, part], where="post", color=_COMMAND, lw=0.7
-        )
 
 
 _TAIL = 0.001  # smallest part of the cycles that the distribution shows

@@ -168,8 +168,7 @@ def robot_legend(
         )
 
 
-def time_axis(axes: Axes, label: bool = True) -> None:
+def time_axis(axes: Axes) -> None:
     """Set the margins and the label of a time axis."""
     axes.margins(x=0.01)
-    if label:
-        axes.set_xlabel("time (s)")
+    axes.set_xlabel("time (s)")

@@ -46,18 +46,6 @@ def test_metrics_are_those_of_the_summary():
         assert ours.path_length_m > 0.5
 
 
-def test_quad_fly_writes_report_and_animation(tmp_path):
-    report, animation = tmp_path / "new" / "flight.html", tmp_path / "flight.gif"
-    words = "fly --time-limit 0.5 --beams 64 --quiet".split()
-    result = CliRunner().invoke(
-        main, [*words, "--report", str(report), "--animate", str(animation)]
-    )
-    assert result.exit_code == 1  # half a second is too short for any goal
-    assert result.output == ""  # the names of the files are left out, too
-    assert "arena, 2 quadcopters, default" in report.read_text(encoding="utf-8")
-    assert animation.read_bytes().startswith(b"GIF89a")
-
-
 def test_quad_fly_refuses_an_animation_before_it_flies(tmp_path):
     result = CliRunner().invoke(main, ["fly", "--animate", str(tmp_path / "flight.avi")])
     assert result.exit_code == 2
