@@ -17,7 +17,7 @@ from quad_nav.config import Configuration
 from quad_nav.config.notes import without_effect
 from quad_nav.config.robot_tree import RobotSource, robot_tree
 from quad_nav.errors import InputError
-from quad_nav.files.values import value_faults
+from quad_nav.files.values import optional, value_faults
 from quad_nav.mission.goal_file import DEFAULT_SETTINGS, SequenceSettings
 from quad_nav.mission.robot_goals import (
     RobotGoals,
@@ -37,7 +37,7 @@ from quad_nav.scenario.goal_checks import (
     with_planner_tolerance,
 )
 from quad_nav.scenario.random_mission import RandomMission, random_mission
-from quad_nav.scenario.rules import RULES, optional
+from quad_nav.scenario.rules import RULES
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.scene_file import load_scene
 
