@@ -113,8 +113,8 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
     problems = value_faults(vars(request), _REQUEST_RULES, request.source)
     request = _without_faulty_values(request)
     values = vars(request)
-    mission, scene = _tried(lambda: (mission_of(values), _scene(values)), problems) or (None, None)
-    configurations = _tried(lambda: tuple(configure(request.robots, scene)), problems) or ()
+    mission, scene = tried(lambda: (mission_of(values), _scene(values)), problems) or (None, None)
+    configurations = tried(lambda: tuple(configure(request.robots, scene)), problems) or ()
     if configurations:
         radius = body_radius_m(configurations, request.robot_radius)
         request = replace(request, robot_radius=radius)
@@ -323,7 +323,7 @@ def _goal_files(request: ScenarioRequest) -> Tuple[Dict[int, Path], List[str]]:
     return {number: Path(path).expanduser() for number, path in enumerate(goals)}, problems
 
 
-def _tried(read: Callable[[], T], problems: List[str]) -> Optional[T]:
+def tried(read: Callable[[], T], problems: List[str]) -> Optional[T]:
     """Return what ``read`` returns, or None with its faults added to ``problems``."""
     try:
         return read()
