@@ -16,7 +16,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 from quad_nav.config import Configuration
 from quad_nav.errors import InputError
 from quad_nav.files.output import output_faults
-from quad_nav.files.values import expected_name, value_faults
+from quad_nav.files.values import expected_name, optional, value_faults
 from quad_nav.mission.distances import SurfaceDistance
 from quad_nav.mission.goal_file import SETTINGS, SequenceSettings, read_settings
 from quad_nav.mission.robot_goals import RobotGoals
@@ -24,7 +24,7 @@ from quad_nav.scenario import RANDOM
 from quad_nav.scenario.coverage import scene_bounds
 from quad_nav.scenario.flight_facts import ros_facts
 from quad_nav.scenario.navigator_parameters import load_navigators
-from quad_nav.scenario.rules import RULES, START_S, optional
+from quad_nav.scenario.rules import RULES, START_S
 from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configurations, read_scenario
 from quad_nav.sim.crowd_record import CrowdRecord
 from quad_nav.sim.movers import Movers

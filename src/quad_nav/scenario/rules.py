@@ -10,7 +10,7 @@ from quad_nav.files.values import (
     choice,
     is_number,
     number,
-    optional_text,
+    optional,
     text,
     whole,
 )
@@ -97,24 +97,16 @@ RULES: Dict[str, Rule] = {
         lambda value: isinstance(value, (int, float)) and value > 0, "a number of seconds above 0"
     ),
     "simulation": BOOLEAN,
-    "start_service": optional_text("the name of a service"),
-    "end_service": optional_text("the name of a service"),
+    "start_service": optional(text("the name of a service")),
+    "end_service": optional(text("the name of a service")),
     "ready_timeout": number(above=0, unit="seconds"),
     "exit_when_done": BOOLEAN,
     "resume": BOOLEAN,
-    "result": optional_text("a file to write"),
-    "journal": optional_text("a file to write"),
+    "result": optional(text("a file to write")),
+    "journal": optional(text("a file to write")),
     # A fleet's processes.
     "hosts": whole(at_least=1),
     "host": Rule(whole(at_least=0).accepts, "a whole number below hosts"),
     "composed": BOOLEAN,
     "separate": Rule(_is_packages, "packages of navigators, such as {nav3: move_base}"),
 }
-
-
-def optional(rule: Rule, nothing: Any = "") -> Rule:
-    """The same rule, which also accepts a value that stands for nothing."""
-    return Rule(
-        lambda value: (value == nothing and type(value) is type(nothing)) or rule.accepts(value),
-        f"{rule.expected}, or {str(nothing) or 'nothing'}",
-    )

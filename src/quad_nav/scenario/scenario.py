@@ -17,7 +17,7 @@ from quad_nav.config import Configuration
 from quad_nav.config.notes import without_effect
 from quad_nav.config.robot_tree import RobotSource, robot_tree
 from quad_nav.errors import InputError
-from quad_nav.files.values import value_faults
+from quad_nav.files.values import optional, value_faults
 from quad_nav.mission.goal_file import DEFAULT_SETTINGS, SequenceSettings
 from quad_nav.mission.robot_goals import (
     RobotGoals,
@@ -37,7 +37,7 @@ from quad_nav.scenario.goal_checks import (
     with_planner_tolerance,
 )
 from quad_nav.scenario.random_mission import RandomMission, random_mission
-from quad_nav.scenario.rules import RULES, optional
+from quad_nav.scenario.rules import RULES
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.scene_file import load_scene
 
@@ -113,8 +113,8 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
     problems = value_faults(vars(request), _REQUEST_RULES, request.source)
     request = _without_faulty_values(request)
     values = vars(request)
-    mission, scene = _tried(lambda: (mission_of(values), _scene(values)), problems) or (None, None)
-    configurations = _tried(lambda: tuple(configure(request.robots, scene)), problems) or ()
+    mission, scene = tried(lambda: (mission_of(values), _scene(values)), problems) or (None, None)
+    configurations = tried(lambda: tuple(configure(request.robots, scene)), problems) or ()
     if configurations:
         radius = body_radius_m(configurations, request.robot_radius)
         request = replace(request, robot_radius=radius)
@@ -305,7 +305,7 @@ def _goal_files(request: ScenarioRequest) -> Tuple[Dict[int, Path], List[str]]:
     return {number: Path(path).expanduser() for number, path in enumerate(goals)}, problems
 
 
-def _tried(read: Callable[[], T], problems: List[str]) -> Optional[T]:
+def tried(read: Callable[[], T], problems: List[str]) -> Optional[T]:
     """Return what ``read`` returns, or None with its faults added to ``problems``."""
     try:
         return read()

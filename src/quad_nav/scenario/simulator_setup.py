@@ -10,9 +10,9 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence
 from quad_nav.config import Configuration, load
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.errors import InputError
-from quad_nav.files.values import is_number, is_whole, unknown_names, value_faults
+from quad_nav.files.values import is_number, is_whole, optional, unknown_names, value_faults
 from quad_nav.scenario.navigator_parameters import load_navigators
-from quad_nav.scenario.rules import RULES, optional, steps_per_scan
+from quad_nav.scenario.rules import RULES, steps_per_scan
 from quad_nav.scenario.scenario import (
     area_of,
     body_radius_m,

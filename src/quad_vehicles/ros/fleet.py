@@ -23,7 +23,7 @@ from quad_nav.files.values import (
     Rule,
     choice,
     number,
-    optional_text,
+    optional,
     text,
     value_faults,
 )
@@ -63,7 +63,7 @@ _DEFAULTS: Dict[str, Any] = {
 }
 _RULES: Dict[str, Rule] = {
     "vehicles": text("the file of the vehicles"),
-    "scene": optional_text("a scene's file"),
+    "scene": optional(text("a scene's file")),
     "lidar_for": choice(("none", "vehicles")),
     "lidar_rate": number(above=0.0, at_most=100.0, unit="Hz"),
     "scan_range": number(above=0.0, unit="radians"),
