@@ -93,20 +93,19 @@ class Course(ABC):
 
 
 class CourseOptions(Protocol):
-    """Options of a course, not yet checked: a dataclass with these fields at least.
-
-    ``parameters`` are (path, value) pairs on top of the base ``config``. ``space`` is the file in
-    ``spaces/`` with the parameters that a search changes by default.
-    """
+    """Options of a course, not yet checked: a dataclass with these fields at least."""
 
     @property
-    def config(self) -> str: ...  # noqa: D102
+    def config(self) -> str:
+        """Name or folder of the base configuration."""
 
     @property
-    def parameters(self) -> Tuple[Tuple[str, Any], ...]: ...  # noqa: D102
+    def parameters(self) -> Tuple[Tuple[str, Any], ...]:
+        """(path, value) pairs on top of the base."""
 
     @property
-    def space(self) -> str: ...  # noqa: D102
+    def space(self) -> str:
+        """File in ``spaces/`` with the parameters that a search changes by default."""
 
     def with_config(self, name: str) -> CourseOptions:
         """Return the same course with another base and no parameters on top."""

@@ -202,14 +202,6 @@ def test_the_body_keeps_to_the_parameters_velocities_and_frames_may_have_any_nam
     )
     flight = setup.contestant.simulation.flight
     assert (flight.max_speed_mps, flight.max_yaw_rate_radps) == (0.5, 1.57)
-    assert setup.contestant.frames == (
-        "odom",
-        "map",
-        "base_link",
-        "base_link0",
-        "Lidar0",
-        "front_laser",
-    )
     backwards = setup_of(path, parameters=(("TrajectoryPlannerROS/escape_vel", -1.3),))
     assert backwards.contestant.simulation.flight.max_speed_mps == 1.3
     told = Results(setup.contestant, (), 1, 0.0).differences()

@@ -19,7 +19,13 @@ import numpy as np
 from quad_bench.barn.dynamic_worlds import START, DynamicWorld, load_dynamic_worlds
 from quad_bench.barn.protocol import TIME_LIMIT_S, Run
 from quad_bench.barn.runs import judged
-from quad_bench.barn.setup import SCANS_PER_S, BarnOptions, Contestant, read_contestant
+from quad_bench.barn.setup import (
+    SCANS_PER_S,
+    BarnOptions,
+    BarnSetup,
+    Contestant,
+    read_contestant,
+)
 from quad_bench.flights import fly_each
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
@@ -107,18 +113,10 @@ class ProtocolClock(FlightObserver):
 
 
 @dataclass(frozen=True)
-class DynamicSetup:
+class DynamicSetup(BarnSetup):
     """A contestant, the worlds, the number of runs through each, and the interpolation."""
 
-    contestant: Contestant
-    worlds: Tuple[DynamicWorld, ...]
-    runs: int
     interpolation: str = SPLINE
-
-    @property
-    def wanted(self) -> int:
-        """Number of flights."""
-        return self.runs * len(self.worlds)
 
 
 def read_dynamic_setup(

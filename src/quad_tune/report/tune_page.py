@@ -100,47 +100,44 @@ def _search(result: TuneResult) -> List[Section]:
     reference = flight_statistics(result.reference)
     importance = importances(result.trials, result.setup.space)
     order = list(importance) or list(result.setup.space.paths)
-    complete = [trial for trial in result.trials if is_complete(trial)]
+    history = plot_section(
+        "history",
+        "Search",
+        "Mean cost of each candidate; lower is better. Pruned candidates did not fly all flights. "
+        "The vertical axis does not start at 0; costs above it, of failed missions, are red.",
+        history_plot(result, reference.cost),
+    )
+    slices = plot_section(
+        "slices",
+        "Values",
+        "Value and cost of each candidate, for each searched parameter. There is no line for the "
+        "tuned value where the base's value was kept. Axes do not start at 0.",
+        slices_plot(result, order, reference.cost),
+    )
+    if not importance:
+        return [history, _pareto(result, reference), slices]
+    bars = plot_section(
+        "importances",
+        "Importance of the parameters",
+        "How strongly each parameter separates good candidates from the others (PED-ANOVA).",
+        importance_plot(importance),
+    )
+    return [history, _pareto(result, reference), bars, slices]
+
+
+def _pareto(result: TuneResult, reference: FlightStatistics) -> Section:
     candidates = {
-        trial.number: FlightStatistics(**trial.user_attrs[STATISTICS]) for trial in complete
+        trial.number: FlightStatistics(**trial.user_attrs[STATISTICS])
+        for trial in result.trials
+        if is_complete(trial)
     }
     gains = result.refined.gains
-    tuned = gains[0].with_it if gains else reference
-    sections = [
-        plot_section(
-            "history",
-            "Search",
-            "Mean cost of each candidate; lower is better. Pruned candidates did not fly all "
-            "flights. The vertical axis does not start at 0; costs above it, of failed missions, "
-            "are red.",
-            history_plot(result, reference.cost),
-        ),
-        plot_section(
-            "pareto",
-            "Time against gap",
-            f"{len(candidates)} candidates completed all flights. The plot shows those that "
-            "reached every goal without contact. No candidate beats one of the front in both time "
-            "and gap. The tuned parameters have flown more flights than the others. The axis of "
-            "the time does not start at 0.",
-            pareto_plot(candidates, reference, tuned),
-        ),
-        plot_section(
-            "slices",
-            "Values",
-            "Value and cost of each candidate, for each searched parameter. There is no line for "
-            "the tuned value where the base's value was kept. Axes do not start at 0.",
-            slices_plot(result, order, reference.cost),
-        ),
-    ]
-    if importance:
-        sections.insert(
-            2,
-            plot_section(
-                "importances",
-                "Importance of the parameters",
-                "How strongly each parameter separates good candidates from the others "
-                "(PED-ANOVA).",
-                importance_plot(importance),
-            ),
-        )
-    return sections
+    return plot_section(
+        "pareto",
+        "Time against gap",
+        f"{len(candidates)} candidates completed all flights. The plot shows those that reached "
+        "every goal without contact. No candidate beats one of the front in both time and gap. "
+        "The tuned parameters have flown more flights than the others. The axis of the time does "
+        "not start at 0.",
+        pareto_plot(candidates, reference, gains[0].with_it if gains else reference),
+    )
