@@ -138,7 +138,7 @@ class ObstacleLayer(GridLayer):
     ) -> None:
         """Take a scan that arrived at ``now_s``; the other arguments as ``observe_scan``."""
         observation = self.observe_scan(source_name, scan, global_from_sensor, global_from_origin)
-        self.add_observation(source_name, observation, now_s)
+        self.buffers[source_name].add(observation, now_s)
 
     def add_cloud(
         self,
@@ -153,10 +153,6 @@ class ObstacleLayer(GridLayer):
         observation = self.observe_cloud(
             source_name, points, global_from_sensor, stamp_s, global_from_origin
         )
-        self.add_observation(source_name, observation, now_s)
-
-    def add_observation(self, source_name: str, observation: Observation, now_s: float) -> None:
-        """Take an observation that arrived at ``now_s``, perhaps shared with other layers."""
         self.buffers[source_name].add(observation, now_s)
 
     def observe_scan(

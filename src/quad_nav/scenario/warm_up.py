@@ -101,7 +101,7 @@ def _add_scans(navigator: Navigator, here: Pose2D) -> None:
                     cloud = np.zeros((1, 3), np.float32)
                     layer.add_cloud(source.name, cloud, lidar, 0.0, 0.0)
                     seen = layer.observe_scan(source.name, scan, lidar, None, is_moving)
-                    layer.add_observation(source.name, seen, 0.0)
+                    layer.buffers[source.name].add(seen, 0.0)
 
 
 def simulate() -> None:
