@@ -206,7 +206,7 @@ class SyntheticFleet:
     def _tables(self, poses: Item) -> List[Item]:
         now = {}
         for i in self.robots:
-            doing = vars(_DOING[i % len(_DOING)])
+            doing = vars(_DOING[i if i < len(_DOING) else 0])
             facts = {"goal": 2, "goals": 3, "distance_m": 1.23 + i, "recoveries": (i % 3, 4)}
             now[i] = rows.RobotNow(**{**doing, **facts, "lidar": self.lidars[i]})
         cycles_s = 0.012 + 0.004 * np.sin(self.time_s / 3 + np.arange(len(self.robots)))
