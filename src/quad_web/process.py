@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import concurrent.futures
 import contextlib
-import importlib.util
 import itertools
 import multiprocessing
 import os
@@ -22,7 +21,7 @@ from typing import Any, Dict, FrozenSet, List, Optional, Tuple
 
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import in_folder, outside_current_folder
-from quad_web.server import Server, Urls, WebOptions
+from quad_web.server import Server, Urls, WebOptions, require_nicegui
 from quad_web.view.actions import READS, Actions, Answer
 from quad_web.view.state import FleetState, Item, Wanted
 
@@ -71,7 +70,7 @@ class Channel:
         self._outgoing.put(message)
 
     def _write(self) -> None:
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, TypeError):  # the latter if it is closed meanwhile
             while True:
                 self._connection.send(self._outgoing.get())
 
@@ -189,21 +188,6 @@ class ServerProcess:
             self.wanted = message
         else:
             self.can_take = True
-
-
-def require_nicegui() -> None:
-    """Check that NiceGUI is installed, without loading it.
-
-    Raises:
-        InputError: It is not.
-    """
-    if importlib.util.find_spec("nicegui") is None:
-        raise InputError(
-            [
-                "web: NiceGUI is not installed; install it with pip install 'quad-nav[web]', in a"
-                " checkout with .venv/bin/pip install '.[web]'"
-            ]
-        )
 
 
 def _run(there: Connection, options: WebOptions, available: FrozenSet[str]) -> None:

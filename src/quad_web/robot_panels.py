@@ -155,11 +155,11 @@ class RobotCard:
         with ui.element("div").classes("card-head"):
             self._dot = ui.element("span").classes("dot")
             self._name = ui.label().classes("card-name").props("data-testid=card-name")
-            self._state = ui.label().classes("state").props("data-testid=card-state")
+            self._state = ui.label().classes("chip state").props("data-testid=card-state")
             ui.space()
             self._deselect = ui.button(icon="close", on_click=lambda: self._client.select(None))
             self._deselect.props("flat dense round size=sm data-testid=deselect title=Deselect")
-        self._reason = ui.label().classes("reason")
+        self._reason = ui.label().classes("muted")
 
     def _make_facts(self) -> None:
         self._values: Dict[str, ui.label] = {}

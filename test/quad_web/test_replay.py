@@ -138,6 +138,7 @@ def test_while_the_file_is_read_the_page_says_how_far_it_is(path, monkeypatch):
     state.add_listener(lambda: titles.append(state.item("flight").data["title"]))
     assert state.item("flight").data["state"] == "starting"
     assert replay.call("pause") == Answer(False, "pause: the recording is still being read")
+    assert replay.call("goal_files") == []
     replay.read()
     shares = [int(title.split(", ")[1].rstrip("%")) for title in titles[:-1]]
     assert titles[0] == f"reading {path.name}, 0%" and titles[-1] == path.name

@@ -31,7 +31,6 @@ from quad_web.view.items import (
     Trails,
     body_row,
     costmap_item,
-    hit_points,
     line_item,
     moving_solids,
     poses_item,
@@ -132,9 +131,8 @@ def test_obstacles_are_put_when_they_have_moved_and_people_look_where_they_walk(
 
 
 def test_robots_have_the_colours_of_all_displays():
-    robots = robots_item(["a", "b"], 0.3, [(0.1, 0.2), (0.0, -0.2)]).data
+    robots = robots_item(["a", "b"], 0.3).data
     assert robots["colours"] == ["#2078dc", "#e66e14"]  # (32, 120, 220), (230, 110, 20)
-    assert robots["footprint"] == [[0.1, 0.2], [0.0, -0.2]]
 
 
 def test_poses_have_tilt_and_velocity_in_map():
@@ -154,7 +152,6 @@ def test_beams_hit_where_they_look():
     scan = Scan(0.5, 0.0, math.pi / 2, 0.02, 60.0, np.array([3.0, np.inf, 0.5], dtype=np.float32))
     pose = Pose3D(1.0, 2.0, 1.06, quaternion_from_yaw(math.pi / 2))
     expected = pytest.approx(np.array([[1.0, 5.0, 1.06], [1.0, 1.5, 1.06]]))
-    assert hit_points(scan, pose) == expected
     item = scan_item(7, scan, pose)
     assert (item.key, item.data) == ("scan/7", {"stamp_s": 0.5})
     assert item.arrays["points"].dtype == np.float32

@@ -206,8 +206,9 @@ class SyntheticFleet:
     def _tables(self, poses: Item) -> List[Item]:
         now = {}
         for i in self.robots:
-            doing = vars(_DOING[i % len(_DOING)])
-            facts = {"goal": 2, "goals": 3, "goal_distance": 1.23 + i, "recoveries": (i % 3, 4)}
+            doing = vars(_DOING[i if i < len(_DOING) else 0])
+            said = {"goal_distance": 1.23 + i}
+            facts = {"goal": 2, "goals": 3, "said": said, "recoveries": (i % 3, 4)}
             now[i] = rows.RobotNow(**{**doing, **facts, "lidar": self.lidars[i]})
         cycles_s = 0.012 + 0.004 * np.sin(self.time_s / 3 + np.arange(len(self.robots)))
         pose = poses.arrays["pose"]

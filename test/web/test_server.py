@@ -181,7 +181,8 @@ def test_a_stop_closes_connections_and_frees_the_port(here, fleet):
     assert get(again.urls.steer)[0] == 200
 
 
-def test_ctrl_c_ends_a_server_with_an_open_page(server):
+def test_ctrl_c_ends_a_server_with_an_open_page(serve):
+    server = serve()
     with open_stream(server.url) as stream:
         stream.receive()
         server.process.send_signal(signal.SIGINT)

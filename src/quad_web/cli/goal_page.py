@@ -9,8 +9,7 @@ from quad_nav.scenario.flight_setup import FlightOptions
 from quad_nav.scenario.preview import MissionPreview
 from quad_web.cli.flight_page import announce
 from quad_web.offline.waiting_mission import WaitingMission
-from quad_web.process import require_nicegui
-from quad_web.server import Server, WebOptions
+from quad_web.server import Server, WebOptions, require_nicegui
 from quad_web.view.state import FleetState
 
 

@@ -44,9 +44,8 @@ def _play(path: Path, address: str, port: int, open_it: bool) -> None:
     """
     # Imported here, because the readers load slowly, and --help does not need them.
     from quad_web.cli.flight_page import announce
-    from quad_web.process import require_nicegui
     from quad_web.replay.replay import Replay
-    from quad_web.server import Server, WebOptions
+    from quad_web.server import Server, WebOptions, require_nicegui
     from quad_web.view.state import FleetState
 
     require_nicegui()

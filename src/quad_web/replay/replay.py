@@ -74,7 +74,7 @@ class Replay(Actions):
 
     def call(self, name: str, *arguments: Any) -> Any:
         """Return what comes of an action."""
-        if not self.is_read.is_set() or self.faults:
+        if name in self.available and (self.faults or not self.is_read.is_set()):
             return Answer(False, f"{name}: the recording is still being read")
         with self._changed:
             answer = super().call(name, *arguments)

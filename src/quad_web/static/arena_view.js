@@ -6,7 +6,7 @@ import { EditTool } from "./edit_tool.js";
 import { fleetOf, LARGE_FLEET, OF_ONE_ROBOT, solidAt, STREAMED_LAYERS } from "./fleet.js";
 import { Gestures } from "./gestures.js";
 import { Hud, LinkNotice } from "./hud.js";
-import { make } from "./dom.js";
+import { make, say } from "./dom.js";
 import { sharedLink } from "./link.js";
 import { MapView } from "./map_view.js";
 import { GoalTool, ViewTool } from "./tools.js";
@@ -16,11 +16,7 @@ const PANS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDow
 
 /** The arena in an element of the page. */
 export class View {
-  /**
-   * @param {HTMLElement} root
-   * @param {(name: string, value: any) => void} emit Tells Python: select, goal, edit, tool, mode,
-   *   follow.
-   */
+  /** `emit` tells Python: select, goal, edit, tool, mode, follow. */
   constructor(root, emit) {
     this.emit = emit;
     this.editing = null;
@@ -88,12 +84,7 @@ export class View {
     }
   }
 
-  /**
-   * Take over what Python has set.
-   *
-   * @param {{role?: string, selected?: ?number, layers?: string[], mode?: string, tool?: string,
-   *   editing?: ?object, following?: boolean}} state
-   */
+  /** Take over what Python has set, see class `Arena` in `arena.py`. */
   apply(state) {
     if (state.role !== undefined) {
       this._role = state.role;
@@ -105,7 +96,7 @@ export class View {
     }
     if (state.selected !== undefined) {
       this._choices.selected = state.selected;
-      this._hud.hideNote();
+      this._hud.note("");
     }
     if (state.editing !== undefined) {
       this.editing = state.editing && { faults: [], ...state.editing };
@@ -134,7 +125,7 @@ export class View {
   _updateLegend() {
     const ofView = this._mode === "2d" ? ["map"] : [];
     const ofScene = this._hasMoving ? ["moving"] : [];
-    this._hud.setLayers(new Set([...this._choices.layers, ...ofView, ...ofScene]));
+    this._hud.legend.setLayers(new Set([...this._choices.layers, ...ofView, ...ofScene]));
   }
 
   /** Select a robot (null: none) as the person has clicked it. */
@@ -313,14 +304,14 @@ export class View {
 
   _hovered(place) {
     if (!place || !Number.isFinite(place.x)) {
-      this._hud.setPlace("");
+      say(this._hud.place, "");
       return;
     }
     const solid = solidAt(this.fleet, place.x, place.y);
     const top = solid && solid.bottom + solid.height;
     const span = solid && `${solid.bottom.toFixed(1)} to ${top.toFixed(1)} m high`;
     const there = solid ? `  ${solid.name}, ${span}` : "";
-    this._hud.setPlace(`x ${place.x.toFixed(2)}  y ${place.y.toFixed(2)} m${there}`);
+    say(this._hud.place, `x ${place.x.toFixed(2)}  y ${place.y.toFixed(2)} m${there}`);
   }
 
   _key(event) {

@@ -46,12 +46,7 @@ const DEFAULT_RADIUS_M = 0.3;
  * @property {?{robot: number, goals: object[], faults: string[]}} editing Goals being edited.
  */
 
-/**
- * Return what is there to draw.
- *
- * @param {import("./store.js").Store} store
- * @param {Choices} choices
- */
+/** Return what is there to draw: a store and choices as one plain object. */
 export function fleetOf(store, choices) {
   const scene = store.get("scene")?.data ?? null;
   const looks = store.get("robots")?.data ?? { colours: [], names: [], radius_m: DEFAULT_RADIUS_M };

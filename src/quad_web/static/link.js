@@ -42,13 +42,7 @@ export class Link extends EventTarget {
     setInterval(() => this._check(), CHECK_MS);
   }
 
-  /**
-   * Ask for layers; those of one robot only are sent for the selected one.
-   *
-   * @param {string[]} layers Names as in `view/state.py` LAYERS.
-   * @param {?number} robot Number of the selected robot.
-   * @param {boolean} every False for LIDAR points and local plans of the selected robot only.
-   */
+  /** Ask for layers; `every` is false for costly ones of the selected robot only. */
   want(layers, robot, every) {
     const wanted = { layers: [...layers].sort(), robot, every };
     if (JSON.stringify(wanted) !== JSON.stringify(this._wanted)) {

@@ -5,12 +5,16 @@
 import { INK, mix, textOn, withAlpha } from "./colours.js";
 import { tiltOf } from "./fleet.js";
 import { disc, FONT, write } from "./map_marks.js";
+import { tracePath } from "./viewport.js";
 
 const LEAST_RADIUS_PX = 8;
 const ICON_BELOW_PX = 11; // drawn as a dart instead of with rotors
 const TILT_FROM_PX = 13;
 const FULL_TILT = 0.35; // sine of the tilt that moves the mark to the hull
 export const FAULTY = { lost: INK.fault, stopped: INK.fault, recovering: INK.waits };
+
+const NOSE = [[0.78, 0], [0.34, 0.2], [0.34, -0.2]];
+const DART = [[0.8, 0], [-0.55, 0.55], [-0.25, 0], [-0.55, -0.55]];
 
 /** Return the radius in pixels that a robot is drawn with. */
 export function drawnRadius(robot, scale) {
@@ -66,13 +70,7 @@ function drawAirframe(context, radius, colour) {
   context.fillStyle = colour;
   context.fill();
   context.stroke();
-  context.beginPath(); // the nose
-  context.moveTo(0.78 * radius, 0);
-  context.lineTo(0.34 * radius, 0.2 * radius);
-  context.lineTo(0.34 * radius, -0.2 * radius);
-  context.closePath();
-  context.fillStyle = "#ffffff";
-  context.fill();
+  fillWhite(context, radius, NOSE);
   context.stroke();
 }
 
@@ -82,11 +80,12 @@ function drawDart(context, radius, colour) {
   context.arc(0, 0, radius, 0, 2 * Math.PI);
   context.fillStyle = colour;
   context.fill();
-  context.beginPath();
-  context.moveTo(0.8 * radius, 0);
-  context.lineTo(-0.55 * radius, 0.55 * radius);
-  context.lineTo(-0.25 * radius, 0);
-  context.lineTo(-0.55 * radius, -0.55 * radius);
+  fillWhite(context, radius, DART);
+}
+
+/** Fill a polygon, whose corners are in radii. */
+function fillWhite(context, radius, corners) {
+  tracePath(context, corners.map(([x, y]) => [x * radius, y * radius]));
   context.closePath();
   context.fillStyle = "#ffffff";
   context.fill();
@@ -108,14 +107,7 @@ function drawTilt(context, robot, px, py, radius) {
   disc(context, px + dx, py + dy, Math.max(2, 0.1 * radius), "#ffffff", INK.text, 1);
 }
 
-/**
- * Draw numbers beside robots. The selected one comes first; a number that would cover another one
- * is left out.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {{px: number, py: number, radius: number, index: number, colour: string,
- *   isSelected: boolean}[]} marks Robots in pixels.
- */
+/** Draw numbers beside robots, the selected one first; none covers another one. */
 export function drawNumbers(context, marks) {
   const size = marks.length > 40 ? 10 : 12;
   const height = size + 4;

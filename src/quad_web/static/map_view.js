@@ -74,13 +74,7 @@ export class MapView {
     this.viewport.zoomAt(px, py, factor);
   }
 
-  /**
-   * Show the whole arena.
-   *
-   * @param {object} fleet As in `fleet.js`.
-   * @param {{left: number, right: number, top: number}} covered Pixels that panels cover on each
-   *   side. They stay free, unless the arena becomes much smaller by that.
-   */
+  /** Show the whole arena; pixels that panels cover stay free, unless it becomes much smaller. */
   fit(fleet, covered) {
     const { viewport } = this;
     const margin = Math.min(20, viewport.width / 30);
@@ -109,12 +103,7 @@ export class MapView {
     return drawnRadius(robot, this.viewport.scale);
   }
 
-  /**
-   * Draw everything.
-   *
-   * @param {object} fleet As in `fleet.js`.
-   * @param {{labels: boolean}} options
-   */
+  /** Draw everything. */
   draw(fleet, { labels }) {
     this._drawBase(fleet);
     const context = this._context;

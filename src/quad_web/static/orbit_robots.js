@@ -26,13 +26,7 @@ export class Quadcopters {
     this._parts = [];
   }
 
-  /**
-   * Show robots.
-   *
-   * @param {object[]} robots As in `fleet.js`.
-   * @param {?object} selected One of them.
-   * @param {(robot: object) => number} radiusOf Radius to draw with, m.
-   */
+  /** Show robots, one of them selected, with the radii in metres of a function. */
   update(robots, selected, radiusOf) {
     if (robots.length > this._capacity) {
       this._build(2 * robots.length);

@@ -25,11 +25,8 @@ const FARTHEST = 4; // arenas away that a pixel may still be a place on
 /** View in space; see `MapView` for what the methods do. */
 export class OrbitView {
   /**
-   * @param {HTMLElement} root The arena's element.
-   * @param {HTMLElement} overlay The element that the pointer moves on.
-   * @param {{moved: () => void, lost: () => void}} host `moved`: the camera has moved; `lost`: the
-   *   browser has taken the graphics away.
-   * @throws {Error} There is no WebGL.
+   * The host has `moved()`, called when the camera has, and `lost()` when the browser has taken the
+   * graphics away. Throws an error without WebGL.
    */
   constructor(root, overlay, host) {
     const isSoftware = probe();

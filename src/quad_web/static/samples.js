@@ -143,13 +143,7 @@ export function layoutOptions(width, height) {
   };
 }
 
-/**
- * Return the lines of all charts.
- *
- * @param {SampleHistory} history
- * @param {?number} selected Number of the robot whose line is bold.
- * @param {(robot: number) => string} colourOf
- */
+/** Return the lines of all charts; that of the selected robot is bold. */
 export function seriesOptions(history, selected, colourOf) {
   const isFew = history.count <= FEW_ROBOTS;
   const robots = [...Array(history.count).keys()].filter((i) => isFew || i === selected);

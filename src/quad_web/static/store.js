@@ -9,11 +9,7 @@ export class Store {
     this._revision = 0;
   }
 
-  /**
-   * Set and remove items.
-   *
-   * @param {{items: import("./codec.js").Item[], removed: string[]}} message
-   */
+  /** Set and remove items. */
   apply({ items, removed }) {
     for (const item of items) {
       const [kind, robot] = item.key.split("/");

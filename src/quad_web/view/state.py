@@ -294,10 +294,10 @@ class FleetState:
             entry = self._items.get(key)
         return entry[1] if entry else None
 
-    def events(self, first: int = 0) -> List[Event]:
-        """Return the events from a number on that are still in the log."""
+    def events(self) -> List[Event]:
+        """Return the events that are still in the log."""
         with self._lock:
-            return [event for event in self._events if event.number >= first]
+            return list(self._events)
 
 
 def with_history(item: Item, before: Sequence[Item]) -> Item:
