@@ -31,7 +31,7 @@ unit: workspace  ## The unit tests
 	@scripts/make_venv .venv requirements-test.txt requirements-web.txt
 	$(PYTHON) -m pytest -n auto --dist loadfile
 
-unit38: packages  ## The unit tests under Python 3.8, where there is one
+unit38: packages  ## A part of the unit tests under Python 3.8, where there is one
 	@scripts/unit_tests_38
 
 web: venv  ## The tests of the web page in a real browser: make web TEST=goal

@@ -24,17 +24,14 @@ fly_with_ros() {
 quad preview --scene scenes/examples/workshop.yaml --goals goals/examples/workshop -o "$out/mission.png"
 quad preview --robots 8 -o "$out/fleet.html"
 
-# A scene, a Gazebo world and a map
-quad fly --scene scenes/examples/workshop.yaml --goals goals/examples/workshop
-quad fly --scene scenes/examples/depot.world --goals goals/examples/depot
+# A map, whose costmap is a static layer; the tests of the documents fly the scene and the world
 quad fly --scene scenes/examples/office.yaml --goals goals/examples/office
-fly_with_ros scene:=scenes/examples/depot.world goals:=goals/examples/depot
 
 # Configurations of four robots: alternatives, other names, variants in folders, a launch file
 for robot in compact:small outdoor/config:map service:tall field/launch/navigation.launch; do
     quad check "test/robots/$robot"
-    quad fly --config "test/robots/$robot" --goals goals/examples/arena
 done
+quad fly --config test/robots/field/launch/navigation.launch --goals goals/examples/arena
 fly_with_ros config:="$PWD/test/robots/compact:small" goals:=goals/examples/arena
 
 # Goals with yaws and stays

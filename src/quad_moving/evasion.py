@@ -175,9 +175,8 @@ class Evasion(CommandFilter):
         """Return what peers leave of commands, float64[c, 2] in the local costmap's frame."""
         from_local = situation.local_from_global.inverse()
         in_map = np.column_stack(from_local.rotate(*commands.T))
-        limited = situation.peers.limit_velocities(
-            in_map, situation.map_pose, situation.velocity, situation.period_s
-        )
+        cell = situation.peers.cell(situation.map_pose, situation.velocity, situation.period_s)
+        limited = cell.limit_velocities(in_map)
         return np.column_stack(situation.local_from_global.rotate(*limited.T))
 
     def _needed_mps2(

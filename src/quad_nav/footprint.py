@@ -29,13 +29,6 @@ def pad(footprint: Footprint, padding_m: float) -> NDArray[np.float64]:
     """Move every non-zero coordinate of a footprint away from zero by the padding.
 
     costmap_2d keeps the padding as float32, so 0.01 m is 0.009999999776 m here too.
-
-    Args:
-        footprint: float64[n, 2], metres in the robot's frame.
-        padding_m: Distance to move coordinates by.
-
-    Returns:
-        float64[n, 2].
     """
     points = _points(footprint)
     return points + np.sign(points) * float(np.float32(padding_m))

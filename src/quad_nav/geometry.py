@@ -71,74 +71,39 @@ class Pose2D:
     def rotate(self, x: Coordinate, y: Coordinate) -> Tuple[Coordinate, Coordinate]:
         """Rotate vectors, such as velocities, by the yaw: from frame b to frame a.
 
-        Args:
-            x: Component along x of frame b: a number, or an array of any shape.
-            y: Component along y of frame b, of a shape that broadcasts with that of ``x``.
-
-        Returns:
-            Components along x and y of frame a.
+        Components are numbers, or arrays of shapes that broadcast.
         """
         return rotate_vectors(math.cos(self.yaw_rad), math.sin(self.yaw_rad), x, y)
 
     def transform(self, x_m: Coordinate, y_m: Coordinate) -> Tuple[Coordinate, Coordinate]:
-        """Transform points, given by coordinate, from frame b to frame a.
+        """Transform points from frame b to frame a.
 
-        Args:
-            x_m: x in frame b: a number, or an array of any shape.
-            y_m: y in frame b, of a shape that broadcasts with that of ``x_m``.
-
-        Returns:
-            x and y in frame a.
+        Coordinates are numbers, or arrays of shapes that broadcast.
         """
         x_m, y_m = self.rotate(x_m, y_m)
         return x_m + self.x_m, y_m + self.y_m
 
     def inverse_transform(self, x_m: Coordinate, y_m: Coordinate) -> Tuple[Coordinate, Coordinate]:
-        """Transform points, given by coordinate, from frame a to frame b.
+        """Transform points, as ``transform`` takes them, from frame a to frame b.
 
         Equals ``inverse().transform(x_m, y_m)`` with less rounding far from (0, 0).
-
-        Args:
-            x_m: x in frame a: a number, or an array of any shape.
-            y_m: y in frame a, of a shape that broadcasts with that of ``x_m``.
-
-        Returns:
-            x and y in frame b.
         """
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         return rotate_vectors(cos, -sin, x_m - self.x_m, y_m - self.y_m)
 
     def transform_points(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Transform points from frame b to frame a.
-
-        Args:
-            points: float64[n, 2], metres in frame b.
-
-        Returns:
-            float64[n, 2], metres in frame a.
-        """
+        """Transform points float64[n, 2], metres, from frame b to frame a."""
         return np.column_stack(self.transform(points[:, 0], points[:, 1]))
 
     def transform_poses(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Transform poses, such as those of a plan, from frame b to frame a.
+        """Transform poses float64[n, 3], rows x, y, yaw, from frame b to frame a.
 
-        Args:
-            poses: float64[n, 3], rows x, y, yaw in frame b.
-
-        Returns:
-            float64[n, 3], rows x, y, yaw in frame a; the yaws are not normalised.
+        The yaws are not normalised.
         """
         return np.column_stack((self.transform_points(poses[:, :2]), poses[:, 2] + self.yaw_rad))
 
     def inverse_transform_points(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Transform points from frame a to frame b; see ``inverse_transform``.
-
-        Args:
-            points: float64[n, 2], metres in frame a.
-
-        Returns:
-            float64[n, 2], metres in frame b.
-        """
+        """Transform points float64[n, 2], metres, from frame a to frame b."""
         return np.column_stack(self.inverse_transform(points[:, 0], points[:, 1]))
 
     def to_3d(self) -> Pose3D:
@@ -171,12 +136,6 @@ def leading_velocity(
     """Return a velocity turned by the angle through which the heading turns in a time.
 
     A vehicle that follows a velocity later by this time flies along its heading in a turn.
-
-    Args:
-        vx_mps: Velocity forward.
-        vy_mps: Velocity to the left.
-        vyaw_radps: Yaw rate.
-        lead_s: The time.
     """
     cos, sin = math.cos(lead_s * vyaw_radps), math.sin(lead_s * vyaw_radps)
     return cos * vx_mps - sin * vy_mps, sin * vx_mps + cos * vy_mps
@@ -227,14 +186,7 @@ class Pose3D:
         return Pose3D(float(x), float(y), float(z), (-qx, -qy, -qz, qw))
 
     def transform_points(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Transform points from frame b to frame a.
-
-        Args:
-            points: float64[n, 3], metres in frame b.
-
-        Returns:
-            float64[n, 3], metres in frame a.
-        """
+        """Transform points float64[n, 3], metres, from frame b to frame a."""
         transformed: NDArray[np.float64] = points @ self.rotation.T + self.translation
         return transformed
 
@@ -273,31 +225,16 @@ def angle_difference(to_rad: float, from_rad: float) -> float:
 def rotate_vectors(
     cos_yaw: Any, sin_yaw: Any, x: Coordinate, y: Coordinate
 ) -> Tuple[Coordinate, Coordinate]:
-    """Rotate planar vectors by an angle that is given as its cosine and sine.
+    """Rotate planar vectors by an angle: return ``(cos x - sin y, sin x + cos y)``.
 
-    For callers with many angles; all others use ``Pose2D``. Numbers and arrays broadcast.
-
-    Args:
-        cos_yaw: Cosine of the angle, or float64[n] of n angles.
-        sin_yaw: Sine of the angle, of the same shape; with the opposite sign the inverse rotation.
-        x: Component along x, a number or an array that broadcasts with the angles.
-        y: Component along y, as ``x``.
-
-    Returns:
-        ``(cos x - sin y, sin x + cos y)``.
+    For callers with many angles; all others use ``Pose2D``. Numbers and arrays broadcast. The
+    opposite sine gives the inverse rotation.
     """
     return cos_yaw * x - sin_yaw * y, sin_yaw * x + cos_yaw * y
 
 
 def yaw_rotations(yaws_rad: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rotation matrices about z of many yaws.
-
-    Args:
-        yaws_rad: float64[n].
-
-    Returns:
-        float64[n, 3, 3].
-    """
+    """Return the rotation matrices float64[n, 3, 3] about z of yaws float64[n]."""
     rotations = np.zeros((len(yaws_rad), 3, 3))
     rotations[:, 0, 0] = rotations[:, 1, 1] = np.cos(yaws_rad)
     rotations[:, 1, 0] = np.sin(yaws_rad)

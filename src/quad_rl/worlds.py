@@ -59,7 +59,10 @@ class BodyWorld:
     def _sequence(self) -> None:
         bodies, now_s = self.bodies(), self.now_s()
         yaws_rad = np.arctan2(bodies.rotations[:, 1, 0], bodies.rotations[:, 0, 0]).tolist()
-        poses = [Pose2D(*row, yaw) for row, yaw in zip(bodies.rows[:, :2].tolist(), yaws_rad)]
+        poses = [
+            Pose2D(x_m, y_m, yaw_rad)
+            for (x_m, y_m), yaw_rad in zip(bodies.rows[:, :2].tolist(), yaws_rad)
+        ]
         self.reached = [
             robot
             for robot, (sequencer, pose) in enumerate(zip(self._sequencers, poses))

@@ -14,8 +14,14 @@ from quad_nav.config.sources import source_paths
 from quad_nav.errors import InputError
 from quad_nav.report.results import interval_text, number_text, percent
 from quad_nav.scenario.flight_setup import FlightSetup
-from quad_tune.courses import HELD_OUT_SEED, LIDAR, Case, files_digest
-from quad_tune.evaluation import ProtocolStatistics
+from quad_tune.courses import (
+    HELD_OUT_SEED,
+    LIDAR,
+    Case,
+    Course,
+    ProtocolStatistics,
+    files_digest,
+)
 from quad_tune.flight_result import FlightResult
 from quad_tune.space import Assignments
 
@@ -50,7 +56,7 @@ class BarnCourseOptions(BarnOptions):
         return course, course.warnings
 
 
-class BarnCourse:
+class BarnCourse(Course):
     """One flight through each world, with the same seed for every candidate.
 
     The search flies through worlds spread evenly over those outside of the official sample. The
@@ -63,6 +69,7 @@ class BarnCourse:
     ends_at_contact = True
 
     def __init__(self, options: BarnOptions) -> None:
+        super().__init__(options.config, options.parameters)
         self.options = options
         setup = read_barn_setup(options)
         self.warnings: List[str] = list(setup.warnings)
@@ -83,16 +90,6 @@ class BarnCourse:
         if problems:
             raise InputError(problems)
         self._rest, self._sample = _spread(rest), sample
-
-    @property
-    def config(self) -> str:
-        """Name or folder of the base configuration."""
-        return self.options.config
-
-    @property
-    def fixed(self) -> Tuple[Tuple[str, Any], ...]:
-        """Parameters on top of the base."""
-        return self.options.parameters
 
     def search_cases(self, count: int) -> Tuple[Case, ...]:
         """Return this many flights through worlds outside of the sample."""

@@ -5,13 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, ClassVar, Dict, List, Mapping, Optional, Protocol, Sequence, Tuple
 
 from quad_nav.config.sources import source_paths
 from quad_nav.errors import InputError
 from quad_nav.mission.robot_goals import WatchedGoalFile
+from quad_nav.scenario import RANDOM
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.sim.simulation_params import SimulationParams
 from quad_tune.flight_result import FlightResult
@@ -19,7 +21,6 @@ from quad_tune.space import Assignments, costmap_paths
 
 HELD_OUT_SEED = 1_000_000
 """Offset of the seeds of held-out flights."""
-RANDOM = "random"
 LIDAR = "lidar"
 _LIDAR_FIELDS = {"range": "range_max_m", "noise": "noise_std_m"}
 
@@ -31,6 +32,90 @@ class Case:
     course: int
     name: str
     seed: int
+
+
+@dataclass(frozen=True)
+class ProtocolStatistics:
+    """Statistics of flights by the protocol of a benchmark.
+
+    Attributes:
+        benchmark: Its name.
+        columns: Headings.
+        cells: A row of the table, a cell for each column.
+        data: The same as plain JSON.
+    """
+
+    benchmark: str
+    columns: Tuple[str, ...]
+    cells: Tuple[str, ...]
+    data: Dict[str, Any]
+
+
+class Course(ABC):
+    """Set of flights that every candidate flies.
+
+    Attributes:
+        ends_at_contact: Whether a flight ends at its first contact.
+        config: Name or folder of the base configuration.
+        fixed: Parameters on top of the base.
+    """
+
+    ends_at_contact = False
+
+    def __init__(self, config: str, fixed: Tuple[Tuple[str, Any], ...]) -> None:
+        self.config, self.fixed = config, fixed
+
+    @abstractmethod
+    def search_cases(self, count: int) -> Tuple[Case, ...]:
+        """Return the first flights of the search."""
+
+    @abstractmethod
+    def held_out_cases(self, count: int) -> Tuple[Case, ...]:
+        """Return flights that the search never flies."""
+
+    @abstractmethod
+    def setup(self, case: Case, assignments: Assignments) -> FlightSetup:
+        """Build a flight with parameters on top of the base.
+
+        Raises:
+            InputError: The parameters are invalid.
+        """
+
+    @abstractmethod
+    def identity(self) -> Dict[str, Any]:
+        """Return what flights depend on besides candidate and case, as plain JSON."""
+
+    def protocol_statistics(
+        self, cases: Sequence[Case], flights: Sequence[FlightResult]
+    ) -> Optional[ProtocolStatistics]:
+        """Return statistics by the course's own protocol, None if it has none."""
+        return None
+
+
+class CourseOptions(Protocol):
+    """Options of a course, not yet checked: a dataclass with these fields at least."""
+
+    @property
+    def config(self) -> str:
+        """Name or folder of the base configuration."""
+
+    @property
+    def parameters(self) -> Tuple[Tuple[str, Any], ...]:
+        """(path, value) pairs on top of the base."""
+
+    @property
+    def space(self) -> str:
+        """File in ``spaces/`` with the parameters that a search changes by default."""
+
+    def with_config(self, name: str) -> CourseOptions:
+        """Return the same course with another base and no parameters on top."""
+
+    def read(self) -> Tuple[Course, Sequence[str]]:
+        """Create the course and return it with its warnings.
+
+        Raises:
+            InputError: Lists every fault.
+        """
 
 
 @dataclass(frozen=True)
@@ -97,24 +182,13 @@ class MissionOptions:
         return MissionCourse(self), check_missions(self)
 
 
-class MissionCourse:
+class MissionCourse(Course):
     """Missions with start positions and noise from the seed, equal for every candidate."""
 
-    ends_at_contact = False
-
     def __init__(self, options: MissionOptions) -> None:
+        super().__init__(options.config, options.parameters)
         self.options = options
         self._missions = (*options.missions, *options.held_out)
-
-    @property
-    def config(self) -> str:
-        """Name or folder of the base configuration."""
-        return self.options.config
-
-    @property
-    def fixed(self) -> Tuple[Tuple[str, Any], ...]:
-        """Parameters on top of the base."""
-        return self.options.parameters
 
     def search_cases(self, count: int) -> Tuple[Case, ...]:
         """Return this many flights, in turn through the missions of the search."""
@@ -163,9 +237,6 @@ class MissionCourse:
             "scans_per_s": given.scans_per_s,
             "simulation": asdict(given.simulation),
         }
-
-    def protocol_statistics(self, cases: Sequence[Case], flights: Sequence[FlightResult]) -> None:
-        """Return None: missions have no protocol of their own."""
 
 
 def check_missions(options: MissionOptions) -> List[str]:

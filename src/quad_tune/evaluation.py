@@ -2,97 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Dict, Iterable, List, Mapping, Optional, Protocol, Sequence, Set, Tuple
+from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Set, Tuple
 
 from quad_nav.errors import InputError
 from quad_nav.offline.workers import Workers, fly_all
-from quad_nav.scenario.flight_setup import FlightSetup
-from quad_tune.courses import Case
+from quad_tune.courses import Case, Course
 from quad_tune.flight_cache import FlightCache, key_text
 from quad_tune.flight_result import FlightResult, FlightTask, fly_task
 from quad_tune.space import Assignments, SearchSpace, Values
 from quad_tune.study_database import Key
-
-
-@dataclass(frozen=True)
-class ProtocolStatistics:
-    """Statistics of flights by the protocol of a benchmark.
-
-    Attributes:
-        benchmark: Its name.
-        columns: Headings.
-        cells: A row of the table, a cell for each column.
-        data: The same as plain JSON.
-    """
-
-    benchmark: str
-    columns: Tuple[str, ...]
-    cells: Tuple[str, ...]
-    data: Dict[str, Any]
-
-
-class Course(Protocol):
-    """Set of flights that every candidate flies; see ``courses`` and ``barn_course``."""
-
-    @property
-    def ends_at_contact(self) -> bool:
-        """True if a flight ends at its first contact."""
-
-    @property
-    def config(self) -> str:
-        """Name or folder of the base configuration."""
-
-    @property
-    def fixed(self) -> Tuple[Tuple[str, Any], ...]:
-        """Parameters on top of the base."""
-
-    def search_cases(self, count: int) -> Tuple[Case, ...]:
-        """Return the first flights of the search."""
-
-    def held_out_cases(self, count: int) -> Tuple[Case, ...]:
-        """Return flights that the search never flies."""
-
-    def setup(self, case: Case, assignments: Assignments) -> FlightSetup:
-        """Build a flight with parameters on top of the base.
-
-        Raises:
-            InputError: The parameters are invalid.
-        """
-
-    def identity(self) -> Dict[str, Any]:
-        """Return what flights depend on besides candidate and case."""
-
-    def protocol_statistics(
-        self, cases: Sequence[Case], flights: Sequence[FlightResult]
-    ) -> Optional[ProtocolStatistics]:
-        """Return statistics by the course's own protocol, None if it has none."""
-
-
-class CourseOptions(Protocol):
-    """Options of a course, not yet checked: a dataclass with these fields at least."""
-
-    @property
-    def config(self) -> str:
-        """Name or folder of the base configuration."""
-
-    @property
-    def parameters(self) -> Tuple[Tuple[str, Any], ...]:
-        """(path, value) pairs on top of the base."""
-
-    @property
-    def space(self) -> str:
-        """File in ``spaces/`` with the parameters that a search changes by default."""
-
-    def with_config(self, name: str) -> CourseOptions:
-        """Return the same course with another base and no parameters on top."""
-
-    def read(self) -> Tuple[Course, Sequence[str]]:
-        """Create the course and return it with its warnings.
-
-        Raises:
-            InputError: Lists every fault.
-        """
 
 
 def task_of(course: Course, case: Case, assignments: Assignments) -> FlightTask:

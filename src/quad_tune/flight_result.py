@@ -90,7 +90,7 @@ class FlightResult:
         """
         try:
             fields = json.loads(text)
-        except (ValueError, RecursionError) as error:
+        except (ValueError, TypeError, RecursionError) as error:
             raise ValueError(f"result is not JSON: {error}") from None
         faults = _result_faults(fields)
         if faults:

@@ -1,7 +1,7 @@
 """SQLite files of studies and flight caches: checked as a whole before anything flies.
 
 The file may be damaged, of another program, locked or read-only, and the disk may be full. A file
-that passes these checks holds whole tables and whole rows, and takes one more row.
+that passes these checks holds whole rows, and takes one more.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import sqlite3
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Tuple
+from typing import Dict, List, Tuple
 
 from quad_nav.errors import InputError, QuadError
 from quad_nav.files.user_files import open_file
@@ -19,7 +19,6 @@ Key = Tuple[str, str, int]
 """Parameters as JSON with sorted keys, the mission's or world's name, the seed."""
 
 MAX_BYTES = 1_000_000_000
-MAX_RESULT_LENGTH = 100_000
 LOCK_TIMEOUT_S = 5.0
 """Longest wait for another process that writes the file."""
 _SMALLEST_PAGE = 512
@@ -28,21 +27,7 @@ _TABLE = (
     "result TEXT NOT NULL, PRIMARY KEY (parameters, mission, seed))"
 )
 INSERT = "INSERT INTO flights (parameters, mission, seed, result) VALUES (?, ?, ?, ?)"
-_SELECT = (
-    "SELECT rowid, parameters, mission, seed, "
-    f"CASE WHEN length(result) <= {MAX_RESULT_LENGTH} THEN result END FROM flights"
-)
-_STUDY_TABLES = {
-    "studies",
-    "study_directions",
-    "study_user_attributes",
-    "trials",
-    "trial_values",
-    "trial_params",
-    "trial_intermediate_values",
-    "trial_user_attributes",
-    "version_info",
-}
+_SELECT = "SELECT rowid, parameters, mission, seed, result FROM flights"
 _ADVICE = {
     "locked": "expected that no other program uses the file; end it, or use another file",
     "full": "expected free disk space for the file; free some, then run the same command again",
@@ -108,30 +93,14 @@ def _check_file(path: Path) -> None:
 def database_faults(database: sqlite3.Connection) -> List[str]:
     """Return the faults of pages, schema and references.
 
-    Views and triggers are faults because they can run without an end.
-
     Raises:
         sqlite3.Error: The file is no database, or cannot be read.
     """
     ((found,),) = database.execute("PRAGMA integrity_check(1)")
     if found != "ok":
         return [f"is damaged: {found}"]
-    schema = list(database.execute("SELECT type, name, sql FROM sqlite_master"))
-    faults = [
-        f"has the {kind} {name}"
-        for kind, name, sql in schema
-        if kind not in ("table", "index") or str(sql).upper().startswith("CREATE VIRTUAL")
-    ]
-    if faults:
-        return faults
-    tables = {name for kind, name, _ in schema if kind == "table"}
-    others = tables - {"flights"}
-    # Optuna creates its tables one by one; a study that was killed then has no flights yet.
-    if others and "flights" in tables and database.execute("SELECT 1 FROM flights").fetchone():
-        faults += [f"has no table {name}" for name in sorted(_STUDY_TABLES - tables)]
     orphans = {(table, parent) for table, _, parent, _ in database.execute(_ORPHANS)}
-    faults += [f"rows of {table} have lost their {parent}" for table, parent in sorted(orphans)]
-    return faults
+    return [f"rows of {table} have lost their {parent}" for table, parent in sorted(orphans)]
 
 
 _ORPHANS = "PRAGMA foreign_key_check"
@@ -147,25 +116,10 @@ def flights_of(database: sqlite3.Connection) -> Tuple[Dict[Key, FlightResult], L
     faults: List[str] = []
     for row, parameters, mission, seed, result in database.execute(_SELECT):
         try:
-            _check_types(parameters, mission, seed, result)
             flights[parameters, mission, seed] = FlightResult.from_json(result)
         except ValueError as error:
             faults.append(f"row {row} of flights: {error}")
     return flights, faults
-
-
-def _check_types(parameters: Any, mission: Any, seed: Any, result: Any) -> None:
-    wanted: Dict[str, Tuple[Any, Callable[[Any], bool]]] = {
-        "parameters": (parameters, lambda value: isinstance(value, str)),
-        "mission": (mission, lambda value: isinstance(value, str)),
-        "seed": (seed, lambda value: isinstance(value, int)),
-        "result": (result, lambda value: isinstance(value, str)),
-    }
-    for name, (value, accepts) in wanted.items():
-        if not accepts(value):
-            expected = "a whole number" if name == "seed" else "a text"
-            limit = f" of at most {MAX_RESULT_LENGTH} characters" if name == "result" else ""
-            raise ValueError(f"{name} is {type(value).__name__}, expected {expected}{limit}")
 
 
 def _check_writable(database: sqlite3.Connection) -> None:

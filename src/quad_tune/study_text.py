@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Sequence, Tuple
 
 import tabulate
 
-from quad_tune.evaluation import ProtocolStatistics
+from quad_nav.report.results import number_text
+from quad_tune.courses import ProtocolStatistics
 from quad_tune.parameter_files import Change, base_configuration, base_value
 from quad_tune.refinement import Gain
 from quad_tune.score import TERMS
@@ -140,8 +141,8 @@ def statistics_row(name: str, statistics: FlightStatistics) -> List[str]:
         str(statistics.flights),
         str(statistics.completed),
         str(statistics.touched),
-        _figure(statistics.mean_time_s, 1),
-        _figure(statistics.least_gap_m, 2),
+        number_text(statistics.mean_time_s),
+        number_text(statistics.least_gap_m, 2),
         f"{statistics.roughness_mps2:.2f}",
         f"{statistics.cost:.3f}",
     ]
@@ -319,7 +320,3 @@ A gap is the smaller of clearance and separation. A lower cost is better.
 def _header(header: Sequence[str], tablefmt: str) -> List[str]:
     """Join the lines of headers for Markdown."""
     return [name.replace("\n", " ") if tablefmt == "github" else name for name in header]
-
-
-def _figure(value: Optional[float], decimals: int) -> str:
-    return "-" if value is None else f"{value:.{decimals}f}"

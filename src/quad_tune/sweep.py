@@ -18,8 +18,8 @@ from quad_nav.files.document import yaml_fault
 from quad_nav.files.user_files import read_text
 from quad_nav.offline.workers import Workers
 from quad_nav.versions import versions
-from quad_tune.courses import LIDAR, Case, identity_text
-from quad_tune.evaluation import Course, CourseOptions, Evaluation, StudyObserver, task_of
+from quad_tune.courses import LIDAR, Case, Course, CourseOptions, identity_text
+from quad_tune.evaluation import Evaluation, StudyObserver, task_of
 from quad_tune.flight_cache import FlightCache
 from quad_tune.flight_result import FlightResult
 from quad_tune.space import Dimension, SearchSpace

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from dataclasses import asdict, fields
-from typing import Any, Dict, List, Optional, Sequence
+from dataclasses import asdict
+from typing import Any, Dict, List, Sequence
 
-import tabulate
-
+from quad_nav.report import results
 from quad_nav.versions import versions
 from quad_tune.statistics import FlightStatistics
 from quad_tune.study_text import format_value
@@ -32,14 +29,7 @@ def table(rows: Sequence[SweepRow]) -> str:
         [*(format_value(row.point[path]) for path in paths), *_cells(row.statistics)]
         for row in rows
     ]
-    header = [path.replace("/", "/\n") for path in paths]
-    return tabulate.tabulate(
-        shown,
-        [*header, *_HEADER],
-        tablefmt="simple",
-        disable_numparse=True,
-        colalign=("right",) * (len(paths) + len(_HEADER)),
-    )
+    return results.table(shown, [*(path.replace("/", "/\n") for path in paths), *_HEADER], names=0)
 
 
 def to_json(setup: SweepSetup, rows: Sequence[SweepRow]) -> Dict[str, Any]:
@@ -64,33 +54,23 @@ def to_json(setup: SweepSetup, rows: Sequence[SweepRow]) -> Dict[str, Any]:
 
 def to_csv(rows: Sequence[SweepRow]) -> str:
     """Return one row per point."""
-    file = io.StringIO()
-    names = [field.name for field in fields(FlightStatistics)]
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow([*rows[0].point, *names])
-    for row in rows:
-        figures = asdict(row.statistics)
-        writer.writerow(
-            [*map(format_value, row.point.values()), *(figures[name] for name in names)]
-        )
-    return file.getvalue().rstrip("\n")
+    cells = [
+        {
+            **{path: format_value(value) for path, value in row.point.items()},
+            **asdict(row.statistics),
+        }
+        for row in rows
+    ]
+    return results.csv_text(cells, list(cells[0]))
 
 
 def _cells(statistics: FlightStatistics) -> List[str]:
     return [
         str(statistics.flights),
-        _percent(statistics.completed, statistics),
-        _percent(statistics.touched, statistics),
-        _figure(statistics.mean_time_s, 1),
-        _figure(statistics.least_gap_m, 2),
+        f"{100 * statistics.completed / statistics.flights:.0f}",
+        f"{100 * statistics.touched / statistics.flights:.0f}",
+        results.number_text(statistics.mean_time_s),
+        results.number_text(statistics.least_gap_m, 2),
         f"{statistics.roughness_mps2:.2f}",
         f"{statistics.cost:.2f}",
     ]
-
-
-def _percent(count: int, statistics: FlightStatistics) -> str:
-    return f"{100 * count / statistics.flights:.0f}"
-
-
-def _figure(value: Optional[float], decimals: int) -> str:
-    return "-" if value is None else f"{value:.{decimals}f}"

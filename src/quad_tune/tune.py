@@ -15,8 +15,8 @@ from quad_nav.errors import InputError, QuadError
 from quad_nav.files.shipped import shipped
 from quad_nav.offline.workers import Workers
 from quad_nav.versions import versions
-from quad_tune.courses import Case
-from quad_tune.evaluation import Course, CourseOptions, Evaluation, StudyObserver
+from quad_tune.courses import Case, Course, CourseOptions
+from quad_tune.evaluation import Evaluation, StudyObserver
 from quad_tune.flight_result import FlightResult
 from quad_tune.parameter_files import base_configuration, base_value
 from quad_tune.refinement import BASE, Refinement, refine, refinement_flights

@@ -18,7 +18,7 @@ from typing import Callable, Dict, List, Mapping, Optional, Tuple
 
 import numpy as np
 
-from quad_nav.geometry import Pose3D, Scan, rotate
+from quad_nav.geometry import Scan
 from quad_nav.topics.vehicle_states import State
 from quad_vehicles.adapter import VehicleAdapter
 from quad_vehicles.arrival_clock import ArrivalClock
@@ -125,15 +125,9 @@ class CrazyflieAdapter(VehicleAdapter[Call]):
         if now_s - at_s > _MOTION_S:
             return
         roll, pitch, yaw = (values[name] for name in _ANGLES)
-        quaternion = crazyflie_quaternion(roll, pitch, yaw)
-        qx, qy, qz, qw = quaternion
         x_m, y_m, z_m = (values[name] for name in _POSITION)
-        estimate = Estimate(
-            stamp_s,
-            Pose3D(x_m, y_m, z_m, quaternion),
-            rotate((-qx, -qy, -qz, qw), velocity),
-            rates,
-        )
+        quaternion = crazyflie_quaternion(roll, pitch, yaw)
+        estimate = Estimate.of(stamp_s, (x_m, y_m, z_m), quaternion, velocity, rates)
         if estimate.is_finite:
             self.estimate = estimate
             self.machine.inputs.take_estimate(estimate, now_s)

@@ -50,21 +50,12 @@ class CrazyflieLink(VehicleLink[Call]):
     ) -> None:
         """Begin to connect.
 
-        Args:
-            vehicle: The vehicle.
-            machine: Its state machine.
-            clock: Returns the present time in s; it never goes back.
-
         Raises:
             InputError: If cflib is missing.
         """
         if cflib is None:
-            raise InputError(
-                [
-                    f"{vehicle.name}: cflib is missing; install requirements-crazyflie.txt"
-                    " (Python 3.10 or later)"
-                ]
-            )
+            what = "cflib is missing; install requirements-crazyflie.txt (Python 3.10 or later)"
+            raise InputError([f"{vehicle.name}: {what}"])
         if not cflib.crtp.CLASSES:
             cflib.crtp.init_drivers()
         self.adapter = CrazyflieAdapter(vehicle, machine)

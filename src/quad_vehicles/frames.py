@@ -23,7 +23,6 @@ from quad_nav.geometry import (
     Quaternion,
     Scan,
     multiply_quaternions,
-    normalize_angle,
     quaternion_from_euler,
 )
 
@@ -46,32 +45,13 @@ def enu_from_ned(vector: Vector) -> Vector:
     return (east, north, -down)
 
 
-def ned_from_enu(vector: Vector) -> Vector:
-    """Return a position or velocity (east, north, up) as (north, east, down)."""
-    east, north, up = vector
-    return (north, east, -up)
-
-
 def flu_from_frd(vector: Vector) -> Vector:
     """Return a velocity or angular velocity (forward, right, down) as (forward, left, up)."""
     forward, right, down = vector
     return (forward, -right, -down)
 
 
-def frd_from_flu(vector: Vector) -> Vector:
-    """Return a velocity or angular velocity (forward, left, up) as (forward, right, down)."""
-    forward, left, up = vector
-    return (forward, -left, -up)
-
-
-def enu_yaw(ned_yaw_rad: float) -> float:
-    """Return a heading clockwise from north as a yaw counter-clockwise from east, [-pi, pi]."""
-    return normalize_angle(math.pi / 2.0 - ned_yaw_rad)
-
-
-def ned_yaw(enu_yaw_rad: float) -> float:
-    """Return a yaw counter-clockwise from east as a heading clockwise from north, [-pi, pi]."""
-    return normalize_angle(math.pi / 2.0 - enu_yaw_rad)
+frd_from_flu = flu_from_frd  # its own inverse
 
 
 def yaw_rate(rate_radps: float) -> float:
@@ -90,23 +70,8 @@ def enu_from_flu(frd_to_ned: MavlinkQuaternion) -> Quaternion:
     """
     w, x, y, z = frd_to_ned
     turned = multiply_quaternions(_ENU_FROM_NED, multiply_quaternions((x, y, z, w), _FRD_FROM_FLU))
-    return _with_positive_w(turned)
-
-
-def ned_from_frd(flu_to_enu: Quaternion) -> MavlinkQuaternion:
-    """Return the attitude of a body in MAVLink's axes, the inverse of ``enu_from_flu``.
-
-    Args:
-        flu_to_enu: Quaternion (x, y, z, w) of length 1.
-
-    Returns:
-        Quaternion (w, x, y, z) of the rotation from FRD to NED, with w >= 0.
-    """
-    # Half a turn is its own inverse, but for the sign of the quaternion.
-    x, y, z, w = _with_positive_w(
-        multiply_quaternions(_ENU_FROM_NED, multiply_quaternions(flu_to_enu, _FRD_FROM_FLU))
-    )
-    return (w, x, y, z)
+    x, y, z, w = turned
+    return (-x, -y, -z, -w) if w < 0.0 else turned
 
 
 def mavlink_quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> MavlinkQuaternion:
@@ -126,11 +91,6 @@ def crazyflie_quaternion(roll_deg: float, pitch_deg: float, yaw_deg: float) -> Q
     """Return a Crazyflie's logged attitude, whose pitch is positive nose up, in ROS's axes."""
     roll, pitch, yaw = (math.radians(angle) for angle in (roll_deg, -pitch_deg, yaw_deg))
     return quaternion_from_euler(roll, pitch, yaw)
-
-
-def _with_positive_w(quaternion: Quaternion) -> Quaternion:
-    x, y, z, w = quaternion
-    return (-x, -y, -z, -w) if w < 0.0 else (x, y, z, w)
 
 
 def scan_from_obstacle_distance(

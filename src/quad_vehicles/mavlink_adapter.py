@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Any, Callable, Dict, List, Mapping, Optional, Set, Tuple
 
 from quad_nav.errors import printable
-from quad_nav.geometry import Pose3D, Quaternion, rotate
+from quad_nav.geometry import Quaternion
 from quad_nav.topics.vehicle_states import IN_FLIGHT, State
 from quad_vehicles import failsafes
 from quad_vehicles.adapter import VehicleAdapter
@@ -174,15 +174,10 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         quaternion, rates, at_s = self._attitude
         if now_s - at_s > _ATTITUDE_S:
             return
-        x_m, y_m, z_m = enu_from_ned((message.x, message.y, message.z))
+        stamp_s = self.clock.ours_s(message.time_boot_ms / 1e3, now_s)
+        position_m = enu_from_ned((message.x, message.y, message.z))
         velocity = enu_from_ned((message.vx, message.vy, message.vz))
-        qx, qy, qz, qw = quaternion
-        estimate = Estimate(
-            self.clock.ours_s(message.time_boot_ms / 1e3, now_s),
-            Pose3D(x_m, y_m, z_m, quaternion),
-            rotate((-qx, -qy, -qz, qw), velocity),
-            rates,
-        )
+        estimate = Estimate.of(stamp_s, position_m, quaternion, velocity, rates)
         if estimate.is_finite:
             self.estimate = estimate
             problem = self._health.position_problem(now_s)
@@ -213,12 +208,6 @@ class MavlinkAdapter(VehicleAdapter[Message]):
                 inputs.clear_texts()
             elif self.machine.state in (State.NOT_READY, State.READY, State.LANDED):
                 inputs.take_text("the autopilot's pre-arm checks fail", now_s)
-
-    def _on_receiver(self, message: Any, _: float) -> None:
-        self._health.take_receiver(message)
-
-    def _on_estimator(self, message: Any, _: float) -> None:
-        self._health.take_estimator(message)
 
     def _on_sticks(self, message: Any, _: float) -> None:
         """Compare the sticks with those at take-off."""
@@ -290,8 +279,9 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         "ATTITUDE": _on_attitude,
         "EXTENDED_SYS_STATE": _on_landed,
         "SYS_STATUS": _on_system,
-        "GPS_RAW_INT": _on_receiver,
-        "estimator": _on_estimator,  # each autopilot has its own message
+        "GPS_RAW_INT": lambda self, message, _: self._health.take_receiver(message),
+        # Each autopilot has its own message.
+        "estimator": lambda self, message, _: self._health.take_estimator(message),
         "RC_CHANNELS": _on_sticks,
         "STATUSTEXT": _on_text,
         "COMMAND_ACK": _on_answer,

@@ -122,11 +122,6 @@ class MavlinkLink(VehicleLink[Message]):
     ) -> None:
         """Open the connection.
 
-        Args:
-            vehicle: The vehicle.
-            machine: Its state machine.
-            clock: Returns the present time in s; it never goes back.
-
         Raises:
             InputError: If pymavlink is missing, or the address cannot be opened.
         """
@@ -145,9 +140,8 @@ class MavlinkLink(VehicleLink[Message]):
         except (ConnectionError, TimeoutError):  # nothing listens there yet
             self._reopen_s = clock() + _REOPEN_S
         except (OSError, OverflowError, ValueError) as error:
-            raise InputError(
-                [f"{vehicle.name}: address {vehicle.address} cannot be opened: {error}"]
-            ) from error
+            what = f"address {vehicle.address} cannot be opened: {error}"
+            raise InputError([f"{vehicle.name}: {what}"]) from error
 
     def _open(self) -> Any:
         self._parser = _new_parser()

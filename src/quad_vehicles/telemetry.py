@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import Optional, Tuple
 
-from quad_nav.geometry import Pose3D, rotate
+from quad_nav.geometry import Pose3D, Quaternion, rotate
 
 Vector = Tuple[float, float, float]
 
@@ -60,6 +60,20 @@ class Estimate:
     odom_from_base: Pose3D
     linear_mps: Vector = (0.0, 0.0, 0.0)
     angular_radps: Vector = (0.0, 0.0, 0.0)
+
+    @classmethod
+    def of(
+        cls,
+        stamp_s: float,
+        position_m: Vector,
+        quaternion: Quaternion,
+        velocity: Vector,
+        turn: Vector,
+    ) -> Estimate:
+        """Make an estimate from a velocity in the odometry frame, and a turn in the body's."""
+        x, y, z, w = quaternion
+        linear_mps = rotate((-x, -y, -z, w), velocity)
+        return cls(stamp_s, Pose3D(*position_m, quaternion), linear_mps, turn)
 
     @property
     def is_finite(self) -> bool:

@@ -16,6 +16,7 @@ own server.
 
 from __future__ import annotations
 
+import contextlib
 import ipaddress
 import secrets
 import socket
@@ -63,22 +64,15 @@ class Tokens:
 
 def is_loopback(address: str) -> bool:
     """Return whether an address or name reaches the own machine only."""
-    if address == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(address).is_loopback
-    except ValueError:
-        return False
+    with contextlib.suppress(ValueError):
+        return address == "localhost" or ipaddress.ip_address(address).is_loopback
+    return False
 
 
 class Access:
     """Refuses requests, and passes all others on with their role in ``scope[ROLE]``.
 
-    Args:
-        app: What answers the requests.
-        address: Address or name that the server listens on.
-        port: Its port.
-        tokens: None lets everyone steer who reaches the server.
+    Without tokens everyone steers who reaches the server, which listens on an address or name.
     """
 
     def __init__(self, app: Application, address: str, port: int, tokens: Optional[Tokens]) -> None:
@@ -159,11 +153,9 @@ def _host_name(host: str) -> str:
 
 
 def _is_address(name: str) -> bool:
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True
+    with contextlib.suppress(ValueError):
+        return bool(ipaddress.ip_address(name))
+    return False
 
 
 def _check_origin(headers: Dict[str, str]) -> None:

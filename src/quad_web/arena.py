@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence
+from typing import Any, Dict, List, Mapping, Sequence
 
 import nicegui
 from nicegui import ui
@@ -18,8 +18,6 @@ from quad_web.view.actions import GoalChange, Role
 
 STATIC = Path(__file__).parent / "static"
 LIBRARIES = Path(nicegui.__file__).parent / "elements" / "lib"
-MODES = ("2d", "3d")
-TOOLS = ("view", "goal", "edit")
 
 SHOWN = {
     "trail": "Trails",
@@ -37,17 +35,9 @@ SHOWN = {
 }
 """What can be switched on and off in the arena, with its name for people."""
 
-SHOWN_AT_FIRST = (
-    "trail",
-    "plan",
-    "local_plan",
-    "scan",
-    "track",
-    "goals",
-    "yields",
-    "contacts",
-    "labels",
-)
+SHOWN_AT_FIRST = [name for name in SHOWN if name not in ("global_costmap", "local_costmap", "cell")]
+
+_KEYS = "Arena: arrows move the view, plus and minus zoom, n and p select a robot"
 
 
 def static_path() -> str:
@@ -57,159 +47,59 @@ def static_path() -> str:
     return f"/_nicegui/{nicegui.__version__}/resources/{resource.key}"
 
 
-class Arena(
+class BrowserView(
     ui.element,
-    component="static/arena.js",
+    component="static/view.js",
     dependencies=[
+        LIBRARIES / "echarts" / "echarts.min.js",
         LIBRARIES / "three" / "three.module.js",
         LIBRARIES / "three" / "modules" / "OrbitControls.js",
         LIBRARIES / "three" / "modules" / "BufferGeometryUtils.js",
     ],
 ):
-    """The arena.
+    """What a module of ``static`` draws; ``state`` is what it was told."""
 
-    Args:
-        role: A page that only watches has the tool "view" alone.
+    def __init__(self, module: str, **state: Any) -> None:
+        super().__init__()
+        ui.add_css(STATIC / "arena.css")
+        self.state: Dict[str, Any] = state
+        self._props.update(resource_path=static_path(), module=module, state=state)
+
+    def apply(self, **changes: Any) -> None:
+        """Change parts of the state; the module's ``apply`` says which there are."""
+        self.state.update(changes)
+        self.run_method("apply", changes)
+
+
+class Arena(BrowserView):
+    """The arena; its events are "select", "goal", "edit", "tool", "mode" and "follow".
+
+    A page that only watches has the tool "view" alone.
     """
 
     def __init__(self, role: Role) -> None:
-        super().__init__()
-        ui.add_css(STATIC / "arena.css")
-        self._role = role
-        self._state: Dict[str, Any] = {
-            "role": role.value,
-            "selected": None,
-            "layers": list(SHOWN_AT_FIRST),
-            "mode": "2d",
-            "tool": "view",
-            "following": False,
-            "editing": None,
-        }
-        self._props["resource_path"] = static_path()
-        self._props["state"] = self._state
-        self._remember("select", "selected", _robot)
-        self._remember("tool", "tool", str)
-        self._remember("mode", "mode", str)
-        self._remember("follow", "following", bool)
-        self.on("edit", self._remember_goals)
+        super().__init__(
+            "arena_view.js",
+            role=role.value,
+            selected=None,
+            layers=SHOWN_AT_FIRST,
+            mode="2d",
+            tool="view",
+            following=False,
+            editing=None,
+        )
+        self.classes("quad-arena").props("tabindex=0 role=application")
+        self.props["aria-label"] = _KEYS
+        self._remember("select", "selected")
+        self._remember("tool", "tool")
+        self._remember("mode", "mode")
+        self._remember("follow", "following")
 
-    # -- what Python says ------------------------------------------------------------
-
-    @property
-    def selected(self) -> Optional[int]:
-        """Number of the selected robot, None without one."""
-        return self._state["selected"]
-
-    @property
-    def tool(self) -> str:
-        """The pointer's tool, one of ``TOOLS``."""
-        return self._state["tool"]
-
-    def select(self, robot: Optional[int]) -> None:
-        """Select a robot; None selects none."""
-        self._apply(selected=robot)
-
-    def follow(self, is_followed: bool) -> None:
-        """Keep the selected robot in the middle, or stop to."""
-        self._apply(following=is_followed)
-
-    def set_layers(self, layers: Sequence[str]) -> None:
-        """Show these of ``SHOWN``.
-
-        Raises:
-            ValueError: A name is unknown.
-        """
-        unknown = sorted(set(layers) - set(SHOWN))
-        if unknown:
-            raise ValueError(f"layers: {unknown} are unknown; expected some of {list(SHOWN)}")
-        self._apply(layers=list(layers))
-
-    def set_mode(self, mode: str) -> None:
-        """Show the arena from above ("2d") or in space ("3d").
-
-        Raises:
-            ValueError: It is neither.
-        """
-        if mode not in MODES:
-            raise ValueError(f"mode {mode!r}; expected one of {MODES}")
-        self._apply(mode=mode)
-
-    def set_tool(self, tool: str) -> None:
-        """Set what the pointer does: select ("view"), send goals ("goal") or edit them ("edit").
-
-        A page that only watches keeps "view".
-
-        Raises:
-            ValueError: The tool is unknown.
-        """
-        if tool not in TOOLS:
-            raise ValueError(f"tool {tool!r}; expected one of {TOOLS}")
-        self._apply(tool=tool if self._role is Role.STEER else "view")
-
-    def edit_goals(
-        self,
-        robot: Optional[int],
-        goals: Sequence[Mapping[str, Any]] = (),
-        faults: Sequence[str] = (),
-    ) -> None:
-        """Show goals that can be edited; None ends it.
-
-        Args:
-            robot: Number of the robot.
-            goals: ``source`` (number in the file or None), ``x``, ``y`` and ``yaw`` (or None).
-            faults: What is wrong with each goal, "" for nothing.
-        """
-        editing = None
-        if robot is not None:
-            editing = {"robot": robot, "goals": [dict(g) for g in goals], "faults": list(faults)}
-        self._apply(editing=editing)
-
-    def _apply(self, **changes: Any) -> None:
-        self._state.update(changes)
-        self.run_method("apply", changes)
-
-    # -- what the person does --------------------------------------------------------
-
-    def on_select(self, callback: Callable[[Optional[int]], Any]) -> None:
-        """Call with the number of a robot that was clicked, None for a click beside all."""
-        self.on("select", lambda event: callback(_robot(event.args)))
-
-    def on_goal(self, callback: Callable[[float, float, Optional[float]], Any]) -> None:
-        """Call with x, y (m) and yaw (rad; None: any) of a goal for the selected robot."""
-        self.on("goal", lambda event: callback(*_pose(event.args)))
-
-    def on_edit(self, callback: Callable[[List[GoalChange]], Any]) -> None:
-        """Call with all goals of the edited robot after each change."""
-        self.on("edit", lambda event: callback(_goals(event.args)))
-
-    def on_tool(self, callback: Callable[[str], Any]) -> None:
-        """Call with the tool when the person leaves one."""
-        self.on("tool", lambda event: callback(event.args))
-
-    def on_mode(self, callback: Callable[[str], Any]) -> None:
-        """Call with "2d" when the browser cannot draw in 3D."""
-        self.on("mode", lambda event: callback(event.args))
-
-    def on_link(self, callback: Callable[[bool], Any]) -> None:
-        """Call with whether the stream is alive, when that changes."""
-        self.on("link", lambda event: callback(event.args))
-
-    def _remember(self, event_name: str, entry: str, kind: Callable[[Any], Any]) -> None:
-        def remember(event: Any) -> None:
-            self._state[entry] = kind(event.args)
-
-        self.on(event_name, remember)
-
-    def _remember_goals(self, event: Any) -> None:
-        if self._state["editing"]:
-            self._state["editing"] = {**self._state["editing"], "goals": event.args, "faults": []}
+    def _remember(self, event_name: str, entry: str) -> None:
+        self.on(event_name, lambda event: self.state.update({entry: event.args}))
 
 
-class Charts(
-    ui.element,
-    component="static/charts.js",
-    dependencies=[LIBRARIES / "echarts" / "echarts.min.js"],
-):
+class Charts(BrowserView):
     """Charts of gap, clearance, speed and control-cycle time over the last minute.
 
     There is a line for each robot of a small fleet, the band from the least to the greatest value
@@ -218,23 +108,12 @@ class Charts(
     """
 
     def __init__(self) -> None:
-        super().__init__()
-        ui.add_css(STATIC / "charts.css")
-        self._props["resource_path"] = static_path()
-        self._props["selected"] = None
-
-    def select(self, robot: Optional[int]) -> None:
-        """Draw the lines of one robot bold; None: of no robot."""
-        self._props["selected"] = robot
-        self.run_method("select", robot)
+        super().__init__("charts_view.js", selected=None)
+        self.classes("quad-charts").props("role=img aria-label=Charts")
 
 
-def _robot(args: Any) -> Optional[int]:
-    return None if args is None else int(args)
-
-
-def _pose(args: Mapping[str, Any]) -> Any:
-    """Return x, y and yaw of a message from the page.
+def goal_pose(args: Mapping[str, Any]) -> Any:
+    """Return x, y (m) and yaw (rad; None: any) of a goal that the page has sent.
 
     Raises:
         ValueError: They are not finite numbers.
@@ -246,8 +125,9 @@ def _pose(args: Mapping[str, Any]) -> Any:
     return numbers[0], numbers[1], None if yaw is None else numbers[2]
 
 
-def _goals(args: Sequence[Mapping[str, Any]]) -> List[GoalChange]:
+def edited_goals(args: Sequence[Mapping[str, Any]]) -> List[GoalChange]:
+    """Return all goals of the edited robot as the page has sent them."""
     return [
-        GoalChange(None if goal["source"] is None else int(goal["source"]), *_pose(goal))
+        GoalChange(None if goal["source"] is None else int(goal["source"]), *goal_pose(goal))
         for goal in args
     ]

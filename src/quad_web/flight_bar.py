@@ -98,7 +98,7 @@ class FlightBar:
     def _make_title(self) -> None:
         with ui.element("div").classes("title-box"):
             self._title = ui.label("waiting for data").classes("title").props("data-testid=title")
-            self._source_chip = ui.label().classes("muted source").props("data-testid=source")
+            self._source_chip = ui.label().classes("muted text-caption").props("data-testid=source")
         self._state = ui.label().classes("chip flight-state").props("data-testid=flight-state")
         self._time = ui.label("–:––").classes("time").props("data-testid=time")
 

@@ -88,10 +88,13 @@ class GoalDraft:
         self.faults = [_value_fault(goal) for goal in self.goals]
 
 
-def _value_fault(goal: Mapping[str, Any]) -> str:
-    """Return what a file's reader says about the values of a goal, "" if nothing."""
-    entry = [goal[name] for name in FIELDS]
+def entry_fault(entry: List[Any]) -> str:
+    """Return what a file's reader says about x, y and yaw of a goal, "" if nothing."""
     return "; ".join(fault[len(": ") :] for fault in goal_faults(entry))
+
+
+def _value_fault(goal: Mapping[str, Any]) -> str:
+    return entry_fault([goal[name] for name in FIELDS])
 
 
 def _entries(file: GoalFileView) -> List[Dict[str, Any]]:

@@ -29,20 +29,11 @@ class GoalEditor:
     """Edits, checks and saves one goal file at a time."""
 
     def __init__(
-        self,
-        client: PageClient,
-        draw: Callable[..., None],
-        set_tool: Callable[[str], None],
+        self, client: PageClient, apply: Callable[..., None], set_tool: Callable[[str], None]
     ) -> None:
-        """Make the panel.
-
-        Args:
-            client: The page.
-            draw: Shows the edited goals of a robot and their faults in the arena; None ends that.
-            set_tool: Called with "edit" or "view": what the mouse does in the arena.
-        """
+        """Make the panel; ``apply`` and ``set_tool`` are those of the arena."""
         self._client = client
-        self._draw = draw
+        self._apply = apply
         self._set_tool = set_tool
         self.draft: Optional[GoalDraft] = None
         self._files: Dict[int, GoalFileView] = {}
@@ -299,9 +290,10 @@ class GoalEditor:
     def _draw_it(self) -> None:
         draft = self.draft
         if not self._is_editing or draft is None:
-            self._draw(None)
+            self._apply(editing=None)
         elif draft.changes() is not None:
-            self._draw(draft.file.robot, draft.goals, draft.faults)
+            goals, faults = [dict(goal) for goal in draft.goals], list(draft.faults)
+            self._apply(editing={"robot": draft.file.robot, "goals": goals, "faults": faults})
 
 
 def _typed(value: Any) -> str:

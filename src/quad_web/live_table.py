@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence
 
 from nicegui import ui
-from nicegui.events import GenericEventArguments
 
 Row = Mapping[str, Any]
 
@@ -43,45 +42,31 @@ class LiveTable(ui.element, component="static/live_table.js"):
         on_pick: Optional[Callable[[Any], None]] = None,
         **options: Any,
     ) -> None:
-        """Make an empty table.
+        """Make a table that says ``empty`` without rows; rows have ``<testid>-row-<key>``.
 
-        Args:
-            columns: As ``column`` returns them.
-            testid: ``data-testid`` of the table; rows have ``<testid>-row-<key>``.
-            empty: Text without rows.
-            on_pick: Called with the key of a row that was clicked.
-            **options: ``follow=True`` shows the end of a log; ``limit`` of rows in the browser;
-                ``sort``, as ``{"sortBy": name, "descending": False}``.
+        Options are ``follow=True`` for the end of a log, a ``limit`` of rows in the browser, and
+        ``sort``, as ``{"sortBy": name, "descending": False}``.
         """
         super().__init__()
         self._props.update(columns=list(columns), testid=testid, empty=empty, **options)
         self._props["data-testid"] = testid
         self._rows: Dict[Any, Row] = {}
         if on_pick is not None:
-            pick = on_pick
+            self.on("pick", lambda event: on_pick(event.args))
 
-            def picked(event: GenericEventArguments) -> None:
-                pick(event.args)
-
-            self.on("pick", picked)
-
-    def set_rows(self, rows: Sequence[Row]) -> int:
-        """Show these rows, each with its ``key``, and return how many cells were sent.
-
-        The rows are kept to compare them with the next ones; the caller does not change them.
-        """
+    def set_rows(self, rows: Sequence[Row]) -> None:
+        """Show these rows, each with its ``key``; the caller does not change them."""
         new = {row["key"]: row for row in rows}
         removed = [key for key in self._rows if key not in new]
-        changed = [
-            cells
-            for key, row in new.items()
-            for cells in [_changed_cells(self._rows.get(key, {}), row)]
-            if cells
-        ]
+        changed = []
+        for key, row in new.items():
+            before = self._rows.get(key, {})
+            cells = {name: one for name, one in row.items() if not before or before[name] != one}
+            if cells:
+                changed.append({**cells, "key": key})
         self._rows = new
         if changed or removed:
             self.run_method("patch", changed, removed)
-        return sum(len(cells) - 1 for cells in changed)
 
     def append(self, rows: Sequence[Row]) -> None:
         """Append rows with new keys, which never change; ``limit`` bounds how many stay."""
@@ -100,12 +85,3 @@ class LiveTable(ui.element, component="static/live_table.js"):
     def filter(self, text: str = "", equal: Optional[Mapping[str, List[Any]]] = None) -> None:
         """Show only rows with this text, and with one of the values in each of the fields."""
         self.run_method("filter", text, dict(equal or {}))
-
-
-def _changed_cells(before: Row, after: Row) -> Dict[str, Any]:
-    """Return the key and the cells that differ; empty if none does."""
-    cells = {name: value for name, value in after.items() if before.get(name, _NONE) != value}
-    return {"key": after["key"], **cells} if cells else {}
-
-
-_NONE = object()

@@ -17,7 +17,7 @@ from typing import Any, Dict, Optional
 from nicegui import background_tasks, context, ui
 
 from quad_nav.errors import excerpt
-from quad_web.arena import SHOWN, SHOWN_AT_FIRST, Arena, Charts
+from quad_web.arena import SHOWN, SHOWN_AT_FIRST, Arena, Charts, edited_goals, goal_pose
 from quad_web.flight_bar import FlightBar, StopButton, enable
 from quad_web.goal_panel import GoalEditor
 from quad_web.log_panels import Diagnostics, EventLog
@@ -46,20 +46,15 @@ PHONE = {
 }
 
 
-def build_page(state: FleetState, actions: Actions, client_role: Role) -> None:
-    """Build the page of one client; NiceGUI calls it for each page that is opened.
+class Page:
+    """One page: the arena, its toolbar, and the panels.
 
     Args:
         state: What is shown; the log of events also gets what came of the page's actions.
         actions: What a person can do. A page that may only watch gets a ``WatchOnly``, which
             refuses everything, whatever its handlers do.
-        client_role: Whether the person may steer.
+        role: Whether the person may steer.
     """
-    Page(state, actions, client_role)
-
-
-class Page:
-    """One page: the arena, its toolbar, and the panels."""
 
     def __init__(self, state: FleetState, actions: Actions, role: Role) -> None:
         """Make all elements, and refresh them while the page is open."""
@@ -102,41 +97,38 @@ class Page:
     def _make_arena(self) -> None:
         role = self.client.role
         self.arena = Arena(role)
-        self.arena.on_select(self.client.select)
-        self.arena.on_goal(self._goal_chosen)
-        self.arena.on_edit(lambda goals: self.goals.take(goals))
-        self.arena.on_tool(self.set_tool)
-        self.arena.on_mode(self._mode_shown)
+        self.arena.on("select", lambda event: self.client.select(event.args))
+        self.arena.on("goal", lambda event: self.card.send(*goal_pose(event.args)))
+        self.arena.on("edit", lambda event: self.goals.take(edited_goals(event.args)))
+        self.arena.on("tool", lambda event: self.set_tool(event.args))
+        self.arena.on("mode", lambda event: self._mode.set_value(event.args))
         with ui.element("div").classes("toolbar"):
             with ui.element("div").classes("group"):
                 self._tools = {
-                    "view": ui.button(icon="near_me", on_click=lambda: self.set_tool("view")),
-                    "goal": ui.button(
-                        icon="add_location_alt", on_click=lambda: self.set_tool("goal")
-                    ),
+                    tool: ui.button(
+                        icon=icon, on_click=lambda _, tool=tool: self.set_tool(tool)
+                    ).props(f"flat dense data-testid=tool-{tool} title='{title}'")
+                    for tool, icon, title in (
+                        ("view", "near_me", "Select"),
+                        ("goal", "add_location_alt", "Send goal"),
+                    )
                 }
-                self._tools["view"].props("flat dense data-testid=tool-view title='Select'")
-                self._tools["goal"].props("flat dense data-testid=tool-goal title='Send goal'")
                 enable(self._tools["goal"], self.client, "send_goal")
             with ui.element("div").classes("group"):
                 options = {"2d": "2D", "3d": "3D"}
-                self._mode = ui.toggle(options, value="2d", on_change=self._set_mode)
+                self._mode: Any = ui.toggle(options, value="2d")
+                self._mode.on_value_change(lambda event: self.arena.apply(mode=event.value))
                 self._mode.props("dense unelevated no-caps data-testid=mode")
-            with ui.element("div").classes("group"), self._layers_button():
-                self._make_layers()
-
-    def _layers_button(self) -> ui.button:
-        button = ui.button(icon="layers")
-        button.props("flat dense data-testid=layers title='Layers'")
-        return button
-
-    def _make_layers(self) -> None:
-        self._switches: Dict[str, ui.switch] = {}
-        with ui.menu().classes("layers"):
-            for name, label in SHOWN.items():
-                is_on = name in SHOWN_AT_FIRST
-                switch = ui.switch(label, value=is_on, on_change=lambda: self._set_layers())
-                self._switches[name] = switch.props(f"dense data-testid=layer-{name}")
+            with ui.element("div").classes("group"):
+                button = ui.button(icon="layers")
+            button.props("flat dense data-testid=layers title='Layers'")
+            with button, ui.menu().classes("layers"):
+                self._switches = {
+                    name: ui.switch(
+                        label, value=name in SHOWN_AT_FIRST, on_change=self._set_layers
+                    ).props(f"dense data-testid=layer-{name}")
+                    for name, label in SHOWN.items()
+                }
 
     def _make_tabs(self, place: str, names: Dict[str, str]) -> None:
         first: Any = next(iter(names))  # the name of a tab does, too
@@ -160,13 +152,13 @@ class Page:
 
     def _make_side(self) -> None:
         with self._panel("robots"):
-            self.table = RobotTable(self.client, lambda: self.arena.follow(True))
+            self.table = RobotTable(self.client, lambda: self.arena.apply(following=True))
         with self._panel("robot"):
             self.card = RobotCard(self.client, self.set_tool)
         with self._panel("parameters"):
             self.parameters = Parameters(self.client)
         with self._panel("goals"):
-            self.goals = GoalEditor(self.client, self.arena.edit_goals, self.set_tool)
+            self.goals = GoalEditor(self.client, self.arena.apply, self.set_tool)
 
     def _make_dock(self) -> None:
         with self._panel("charts"):
@@ -236,8 +228,8 @@ class Page:
         if self.client.role is not Role.STEER:
             tool = "view"
         if tool != "view":
-            self.arena.follow(False)  # the ground must not move under the pointer
-        self.arena.set_tool(tool)
+            self.arena.apply(following=False)  # the ground must not move under the pointer
+        self.arena.apply(tool=tool)
         self._show_tool(tool)
 
     def _show_tool(self, tool: str) -> None:
@@ -246,20 +238,11 @@ class Page:
             button.classes(**classes)
         self.goals.set_editing(tool == "edit")
 
-    def _set_mode(self) -> None:
-        self.arena.set_mode(self._mode.value)
-
-    def _mode_shown(self, mode: str) -> None:
-        self._mode.value = mode
-
     def _set_layers(self) -> None:
         shown = [name for name, switch in self._switches.items() if switch.value]
-        self.arena.set_layers(shown)
+        self.arena.apply(layers=shown)
 
     def _selected(self, robot: Optional[int]) -> None:
-        self.arena.select(robot)
-        self.charts.select(robot)
+        self.arena.apply(selected=robot)
+        self.charts.apply(selected=robot)
         background_tasks.create(self._read(), name="read the selected robot")
-
-    async def _goal_chosen(self, x_m: float, y_m: float, yaw_rad: Optional[float]) -> None:
-        await self.card.send(x_m, y_m, yaw_rad)

@@ -12,26 +12,8 @@ import concurrent.futures
 from typing import Any, Callable, List, Mapping, Optional
 
 from quad_nav.errors import printable
-from quad_web.view.actions import Actions, Answer, Role
+from quad_web.view.actions import LABELS, READS, Actions, Answer, Role
 from quad_web.view.state import FleetState
-
-LABELS = {
-    "start": "start",
-    "pause": "pause",
-    "reset": "reset",
-    "set_rate": "rate",
-    "seek": "go to a time",
-    "send_goal": "send a goal",
-    "cancel": "cancel the goal",
-    "stop_all": "stop all",
-    "clear_costmaps": "clear costmaps",
-    "enable_lidar": "switch the LIDAR",
-    "set_parameters": "change parameters",
-    "save_goals": "save goals",
-}
-"""The methods of ``Actions`` that change something, and what they do."""
-READS = ("parameters", "goal_files", "check_goals")
-"""The methods of ``Actions`` that change nothing: a page that may only watch calls them, too."""
 
 WATCHES = "this page may only watch; open it with the steering address to steer"
 NOT_HERE = "not possible here"
@@ -59,14 +41,7 @@ class PageClient:
         role: Role,
         show: Callable[[Answer], None] = lambda answer: None,
     ) -> None:
-        """Begin with no robot selected.
-
-        Args:
-            state: What is shown.
-            actions: What a person can do here.
-            role: Whether the person may steer.
-            show: Called with the answer of each action, in the page's event loop.
-        """
+        """Select no robot; ``show`` gets the answer of each action, in the page's event loop."""
         self.state = state
         self.role = role
         self.selected: Optional[int] = None
@@ -88,7 +63,7 @@ class PageClient:
         """Call an action in a thread, and show and log what came of it.
 
         Args:
-            name: Name of a method in ``LABELS``.
+            name: One of ``LABELS``.
             *args: Its arguments.
             robot: The robot that the entry in the log is of, None for the whole fleet.
             is_quiet: Show and log only a refusal, for actions that come many in a second.
@@ -100,7 +75,7 @@ class PageClient:
             return answer
         pool = _stoppers if name == "stop_all" else _workers
         loop = asyncio.get_running_loop()
-        answer = await loop.run_in_executor(pool, getattr(self._actions, name), *args)
+        answer = await loop.run_in_executor(pool, self._actions.call, name, *args)
         if not (is_quiet and answer.ok):
             level = "info" if answer.ok else "warning"
             text = answer.text if answer.ok else f"{LABELS[name]} failed: {answer.text}"
@@ -109,11 +84,11 @@ class PageClient:
         return answer
 
     async def read(self, name: str, *args: Any) -> Any:
-        """Return what a method in ``READS`` returns; it runs in a thread."""
+        """Return what one of ``READS`` returns; it runs in a thread."""
         if name not in READS:
             raise ValueError(f"{name}: expected one of {', '.join(READS)}")
         loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(_workers, getattr(self._actions, name), *args)
+        return await loop.run_in_executor(_workers, self._actions.call, name, *args)
 
     def show(self, answer: Answer) -> None:
         """Show an answer without an entry in the log, such as a fault in what was typed."""

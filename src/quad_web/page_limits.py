@@ -110,10 +110,8 @@ def _check_handshake(connection: Dict[str, Any], message: Dict[str, Any]) -> Non
 class Complaints(logging.Filter):
     """Log each kind of fault in one line, every 5 s at most, and 20 kinds at most.
 
-    A traceback has some fifty lines, and a page may cause a thousand in a second.
-
-    Args:
-        is_ending: Whether the server ends, and cuts connections off: then nothing is logged.
+    A traceback has some fifty lines, and a page may cause a thousand in a second. Nothing is logged
+    while the server ends, which cuts connections off.
     """
 
     def __init__(self, is_ending: Callable[[], bool]) -> None:

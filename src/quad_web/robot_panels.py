@@ -12,12 +12,13 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, Union
 
 import numpy as np
 from nicegui import ui
+from numpy.typing import NDArray
 
 from quad_nav.errors import printable
-from quad_nav.geometry import Pose2D, angle_difference
-from quad_nav.mission.goal import goal_faults
+from quad_nav.geometry import Pose2D
 from quad_nav.topics.robot_topics import COLUMNS
 from quad_web.flight_bar import enable, why_idle
+from quad_web.goal_draft import entry_fault
 from quad_web.live_table import LiveTable, column
 from quad_web.page_client import PageClient
 from quad_web.view.state import FleetState
@@ -91,24 +92,21 @@ class RobotTable:
 
 def pose_of(state: FleetState, robot: int) -> Optional[Pose2D]:
     """Return a robot's pose in ``map``, None if it is not known."""
-    item = state.item("poses")
-    poses = item.arrays.get("pose") if item else None
-    if poses is None or not 0 <= robot < len(poses) or not np.isfinite(poses[robot]).all():
+    poses = _poses(state)
+    if not 0 <= robot < len(poses) or not np.isfinite(poses[robot]).all():
         return None
     return Pose2D(float(poses[robot][0]), float(poses[robot][1]), float(poses[robot][5]))
 
 
-def heading_deg(pose: Pose2D) -> float:
-    """Return a heading in degrees from -180 to 180."""
-    return math.degrees(angle_difference(pose.yaw_rad, 0.0))
+def _poses(state: FleetState) -> NDArray[np.float32]:
+    """Return the array of the item ``poses``, without robots if there is none."""
+    item = state.item("poses")
+    return np.zeros((0, 9), np.float32) if item is None else item.arrays["pose"]
 
 
 def nearest_robot(state: FleetState, x_m: float, y_m: float) -> Optional[int]:
     """Return the robot that is nearest to a position in ``map``, None without poses."""
-    item = state.item("poses")
-    poses = item.arrays.get("pose") if item else None
-    if poses is None or not len(poses):
-        return None
+    poses = _poses(state)
     distances = np.hypot(poses[:, 0] - x_m, poses[:, 1] - y_m)
     return None if np.isnan(distances).all() else int(np.nanargmin(distances))
 
@@ -116,15 +114,7 @@ def nearest_robot(state: FleetState, x_m: float, y_m: float) -> Optional[int]:
 def goal_pose(
     state: FleetState, robot: Optional[int], x_m: float, y_m: float, yaw_rad: Optional[float]
 ) -> Pose2D:
-    """Return a goal; without a yaw the robot faces the way it comes.
-
-    Args:
-        state: Has the robots' poses.
-        robot: The robot, None for the nearest one.
-        x_m: Position in ``map``.
-        y_m: Position in ``map``.
-        yaw_rad: Yaw in ``map``, None for the direction from the robot to the goal.
-    """
+    """Return a goal in ``map`` for a robot, None for the nearest; without a yaw it looks ahead."""
     if yaw_rad is not None:
         return Pose2D(x_m, y_m, yaw_rad)
     number = nearest_robot(state, x_m, y_m) if robot is None else robot
@@ -145,22 +135,11 @@ def typed_number(text: Any) -> Union[float, str, None]:
         return stripped
 
 
-def goal_entry(x: Any, y: Any, yaw: Any) -> Tuple[List[Any], str]:
-    """Return the goal that was typed as an entry of a goal file, and its faults as in a file."""
-    entry = [typed_number(x), typed_number(y), typed_number(yaw)]
-    return entry, "; ".join(fault[len(": ") :] for fault in goal_faults(entry))
-
-
 class RobotCard:
     """The selected robot: what it does, and what it can be told."""
 
     def __init__(self, client: PageClient, set_tool: Callable[[str], None]) -> None:
-        """Make the card.
-
-        Args:
-            client: The page.
-            set_tool: Called with "goal" or "view": what a click in the arena does.
-        """
+        """Make the card; ``set_tool`` is that of the arena."""
         self._client = client
         self._set_tool = set_tool
         with ui.element("div").classes("card").props("data-testid=card"):
@@ -176,11 +155,11 @@ class RobotCard:
         with ui.element("div").classes("card-head"):
             self._dot = ui.element("span").classes("dot")
             self._name = ui.label().classes("card-name").props("data-testid=card-name")
-            self._state = ui.label().classes("state").props("data-testid=card-state")
+            self._state = ui.label().classes("chip state").props("data-testid=card-state")
             ui.space()
             self._deselect = ui.button(icon="close", on_click=lambda: self._client.select(None))
             self._deselect.props("flat dense round size=sm data-testid=deselect title=Deselect")
-        self._reason = ui.label().classes("reason")
+        self._reason = ui.label().classes("muted")
 
     def _make_facts(self) -> None:
         self._values: Dict[str, ui.label] = {}
@@ -203,11 +182,12 @@ class RobotCard:
             self._lidar = ui.switch("LIDAR").props("dense data-testid=lidar")
             self._lidar.on("update:model-value", self._switch_lidar)
             self._lidar_shown: Optional[Tuple[int, bool]] = None
-            for element, name in (
+            self._controls = (
                 (self._cancel, "cancel"),
                 (self._clear, "clear_costmaps"),
                 (self._lidar, "enable_lidar"),
-            ):
+            )
+            for element, name in self._controls:
                 enable(element, client, name)
 
     def _make_goal(self) -> None:
@@ -242,11 +222,7 @@ class RobotCard:
         hint = _HINT if robot is None else ""
         self._reason.text = printable(row.get("reason", "")) if row else hint
         self._reason.set_visibility(bool(self._reason.text))
-        for element, name in (
-            (self._cancel, "cancel"),
-            (self._clear, "clear_costmaps"),
-            (self._lidar, "enable_lidar"),
-        ):
+        for element, name in self._controls:
             element.set_enabled(row is not None and not why_idle(client, name))
         if row is not None and robot is not None:
             self._show_facts(row, robot)
@@ -264,7 +240,7 @@ class RobotCard:
         used = row.get("recoveries")
         facts = {
             "position": f"{pose.x_m:.2f}, {pose.y_m:.2f} m" if pose else "–",
-            "heading": f"{heading_deg(pose):.0f}°" if pose else "–",
+            "heading": f"{math.degrees(pose.yaw_rad):.0f}°" if pose else "–",
             "speed": _with_unit(shown["speed_mps"], "m/s"),
             "goal": _goal_text(shown["goal"], shown["goal_distance"]),
             "gap": _with_unit(shown["gap_m"], "m"),
@@ -293,9 +269,9 @@ class RobotCard:
             self._lidar.value = not is_on
 
     async def _send_typed(self) -> None:
-        entry, fault = goal_entry(*(field.value for field in self._fields))
-        self._fault.text = fault
-        if not fault:
+        entry: List[Any] = [typed_number(field.value) for field in self._fields]
+        self._fault.text = entry_fault(entry)
+        if not self._fault.text:
             await self.send(*entry)
 
     async def send(self, x_m: float, y_m: float, yaw_rad: Optional[float]) -> None:

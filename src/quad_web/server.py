@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import importlib
+import importlib.util
 import logging
 import re
 import secrets
@@ -15,7 +16,7 @@ import socket
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, Callable, Iterator, Optional, Tuple
+from typing import Any, Callable, Optional, Tuple
 
 from quad_nav.errors import InputError
 from quad_web.access import ROLE, Access, Tokens, is_loopback, refuse
@@ -106,12 +107,13 @@ class Server:
     """
 
     def __init__(self, state: FleetState, actions: Actions, options: WebOptions) -> None:
-        uvicorn = _imported("uvicorn")
-        http, websocket = limited(
-            _imported("uvicorn.protocols.http.h11_impl").H11Protocol,
-            _imported("uvicorn.protocols.websockets.auto").AutoWebSocketsProtocol,
-        )
-        self._nicegui = _imported("nicegui")
+        require_nicegui()
+        import nicegui
+        from starlette.middleware.gzip import GZipMiddleware
+
+        uvicorn: Any = importlib.import_module("uvicorn")
+        http, websocket = _protocols()
+        self._nicegui = nicegui
         pages = _nicegui_app(self._nicegui, state, actions, options)
         tokens = options.tokens()
         self._options = options
@@ -122,7 +124,9 @@ class Server:
         # Compression halves the stream and quarters the page, for twice the server's time: worth it
         # where a radio link may be between.
         is_remote = not is_loopback(options.address)
-        self._pages = _compressed(pages) if is_remote else pages
+        if is_remote:
+            pages = GZipMiddleware(pages, minimum_size=_COMPRESSES_FROM, compresslevel=4)
+        self._pages = pages
         config = uvicorn.Config(
             Access(self._route, options.address, port, tokens),
             interface="asgi3",
@@ -140,7 +144,7 @@ class Server:
             timeout_graceful_shutdown=1,
         )
         self._server = uvicorn.Server(config)
-        self._server.capture_signals = _no_signals
+        self._server.capture_signals = contextlib.nullcontext  # they are left to the caller
         self._thread = threading.Thread(target=self._run, name="web", daemon=True)
 
     def start(self) -> None:
@@ -193,32 +197,26 @@ class Server:
             drop_old_pages(self._nicegui)
 
 
-def serve(state: FleetState, actions: Actions, options: WebOptions) -> None:
-    """Serve the page until the caller is interrupted.
+def _protocols() -> Tuple[Any, Any]:
+    from uvicorn.protocols.http.h11_impl import H11Protocol
+    from uvicorn.protocols.websockets.auto import AutoWebSocketsProtocol
 
-    Signals are left to the caller: handlers run as usual, in the main thread.
+    return limited(H11Protocol, AutoWebSocketsProtocol)
+
+
+def require_nicegui() -> None:
+    """Check that NiceGUI is installed, without loading it.
 
     Raises:
-        InputError: NiceGUI is not installed, or the address cannot be listened on.
+        InputError: It is not.
     """
-    server = Server(state, actions, options)
-    try:
-        server.start()
-        server.wait()
-    finally:
-        server.stop()
-
-
-def _imported(name: str) -> Any:
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
+    if importlib.util.find_spec("nicegui") is None:
         raise InputError(
             [
-                f"web: NiceGUI is not installed ({error}); install it with "
-                "pip install 'quad-nav[web]', in a checkout with .venv/bin/pip install '.[web]'"
+                "web: NiceGUI is not installed; install it with pip install 'quad-nav[web]', in a"
+                " checkout with .venv/bin/pip install '.[web]'"
             ]
-        ) from error
+        )
 
 
 def _nicegui_app(nicegui: Any, state: FleetState, actions: Actions, options: WebOptions) -> Any:
@@ -246,14 +244,9 @@ def _nicegui_app(nicegui: Any, state: FleetState, actions: Actions, options: Web
     def _index() -> None:
         role = nicegui.context.client.request.scope[ROLE]
         nicegui.ui.add_head_html(_HIDE_TOKEN)
-        page.build_page(state, actions if role is Role.STEER else WatchOnly(actions), role)
+        page.Page(state, actions if role is Role.STEER else WatchOnly(actions), role)
 
     return nicegui.app
-
-
-def _compressed(app: Any) -> Any:
-    gzip = _imported("starlette.middleware.gzip")
-    return gzip.GZipMiddleware(app, minimum_size=_COMPRESSES_FROM, compresslevel=4)
 
 
 def _bound(options: WebOptions) -> socket.socket:
@@ -318,8 +311,3 @@ def _outward_address() -> str:
             return str(probe.getsockname()[0])
         except OSError:
             return socket.gethostname()
-
-
-@contextlib.contextmanager
-def _no_signals() -> Iterator[None]:
-    yield

@@ -7,8 +7,7 @@ import shutil
 
 import numpy as np
 import pytest
-from families import DATA, FAMILIES, cases
-from families.case import InvalidValue, load_case
+from families import DATA
 from families.comparison import Comparison, Difference
 from run import run
 
@@ -63,13 +62,6 @@ def test_first_failure_with_case_field_and_difference(tmp_path, capsys, occupanc
     assert "worse" not in output
 
 
-def test_what_ours_raises_is_a_failure(tmp_path, capsys, monkeypatch):
-    put(tmp_path, "occupancy", "cost_to_occupancy", "case")
-    monkeypatch.setitem(FAMILIES, "occupancy", lambda path: [][0])
-    assert run(tmp_path) == 1
-    assert rows(capsys.readouterr().out)["occupancy"][2:5] == ["case", "(raised)", "IndexError:"]
-
-
 def test_unknown_families_are_counted_and_named(tmp_path, capsys):
     put(tmp_path, "occupancy", "cost_to_occupancy", "case")
     put(tmp_path, "occupancy", "footprint_00", "another")
@@ -90,17 +82,10 @@ def test_unknown_families_are_counted_and_named(tmp_path, capsys):
     "spoil, said",
     [
         (lambda family: (family / "index.json").unlink(), "index.json: cannot be read"),
-        (lambda family: (family / "index.json").write_text("{"), "index.json: cannot be read"),
-        (lambda family: (family / "index.json").write_text("[" * 99999), "json: cannot be read"),
         (lambda family: (family / "index.json").write_text("[1]"), "expected a list of {case: "),
         (lambda family: (family / "index.json").write_text("[]"), "there is no case in it"),
         (lambda family: (family / "case.npz").unlink(), "case.npz: the index names it, and there"),
         (lambda family: (family / "case.npz").write_text("?"), "case.npz: cannot be read"),
-        (lambda family: (family / "case.npz").write_bytes(b""), "case.npz: cannot be read"),
-        (
-            lambda family: np.savez(family / "case.npz", meta=np.array("[]")),
-            "case.npz: cannot be read: 'meta' is no JSON object",
-        ),
         (
             lambda family: (family / "case.npz").rename(family / "stray.npz"),
             "stray.npz: the index does not name it",
@@ -123,18 +108,6 @@ def test_what_cannot_be_compared_is_named_and_the_rest_is_compared(tmp_path, cap
     assert "\n1 of " in output and "were not compared.\n" in output
 
 
-def test_damaged_recordings_never_end_the_command(tmp_path, capsys):
-    put(tmp_path, "occupancy", "cost_to_occupancy", "good")
-    put(tmp_path, "occupancy", "footprint_00", "case")
-    path = tmp_path / "occupancy" / "case.npz"
-    whole = path.read_bytes()
-    for place in range(0, len(whole), max(1, len(whole) // 150)):
-        for damaged in (whole[:place], whole[:place] + b"\xff\x00\xff" + whole[place + 3 :]):
-            path.write_bytes(damaged)
-            assert run(tmp_path) in (0, 1)
-            assert rows(capsys.readouterr().out)["occupancy"][0] == "2"
-
-
 def test_arrays_that_nothing_compares_are_named(tmp_path, capsys):
     put(tmp_path, "static", "static_00", "case", tomorrow_000=np.zeros(3))
     assert run(tmp_path) == 1
@@ -148,17 +121,6 @@ def test_no_folder_and_no_recordings(tmp_path, capsys):
     assert "there are no recordings in it" in capsys.readouterr().err
 
 
-def test_every_family_that_is_compared_is_among_the_recordings():
-    assert [family for family in FAMILIES if not cases(family)] == []
-
-
-def test_missing_keys_within_meta_are_the_recordings_fault(tmp_path):
-    put(tmp_path, "occupancy", "footprint_00", "case", meta=np.array('{"params": {}}'))
-    meta = load_case(tmp_path / "occupancy" / "case.npz").meta
-    with pytest.raises(InvalidValue, match="there is no 'robot_radius'"):
-        meta["params"]["robot_radius"]
-
-
 @pytest.mark.parametrize(
     "found, recorded, text",
     [
@@ -166,8 +128,6 @@ def test_missing_keys_within_meta_are_the_recordings_fault(tmp_path):
         ([1, 2, 3], [1, 5, 6], "2 of 3 differ, the first at [1]: 2, recorded 5"),
         ([[0.0, np.nan]], [[0.0, 1.0]], "1 of 2 differ, the first at [0, 1]: nan, recorded 1.0"),
         (np.zeros((2, 3)), np.zeros((2, 4)), "shape (2, 3), recorded (2, 4)"),
-        (["a"], ["b"], "1 of 1 differ, the first at [0]: a, recorded b"),
-        (True, False, "True, recorded False"),
     ],
 )
 def test_exact(found, recorded, text):
@@ -180,9 +140,7 @@ def test_exact(found, recorded, text):
     "found, recorded, text",
     [
         ([1.0, 2.0], [1.0, 2.25], "0.25 apart at [1]: 2.0, recorded 2.25, allowed are 0.1"),
-        (1.0, 1.5, "0.5 apart: 1.0, recorded 1.5, allowed are 0.1"),
         ([np.nan], [1.0], "inf apart at [0]: nan, recorded 1.0, allowed are 0.1"),
-        ([np.inf], [-np.inf], "inf apart at [0]: inf, recorded -inf, allowed are 0.1"),
         (np.zeros((0, 2)), np.zeros((1, 2)), "shape (0, 2), recorded (1, 2)"),
     ],
 )
@@ -190,16 +148,3 @@ def test_near(found, recorded, text):
     comparison = Comparison()
     comparison.near("field", found, recorded, 0.1)
     assert comparison.differences == [Difference("field", text)]
-
-
-@pytest.mark.parametrize(
-    "same",
-    [[1.0, np.nan, np.inf], np.zeros((0, 3)), 5, [True, False], np.array(["obstacle_layer"])],
-)
-def test_agreement(same):
-    comparison = Comparison()
-    comparison.exact("field", same, same)
-    if np.asarray(same).dtype.kind != "U":
-        comparison.near("field", same, same, 0.0)
-        comparison.near("field", np.asarray(same, float), np.asarray(same, float) + 1e-3, 2e-3)
-    assert comparison.differences == []

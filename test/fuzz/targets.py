@@ -7,7 +7,6 @@ unit tests call them with the files below ``corpus`` and mutations of these.
 
 from __future__ import annotations
 
-import json
 import tempfile
 from functools import lru_cache
 from pathlib import Path
@@ -228,7 +227,3 @@ def odometry(second: int, x_m: float):
             "geometry_msgs/TwistWithCovariance", make("geometry_msgs/Twist", vector, vector), zeros
         ),
     )
-
-
-def json_bytes(value: object) -> bytes:
-    return json.dumps(value).encode()

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import List
+from typing import Any, List
 
-from quad_web.process import Batch, Call
+from quad_web.process import Batch
 from quad_web.view.state import LAYERS, FleetState, Wanted
 
 EVERYTHING = Wanted(frozenset(LAYERS), 0)
@@ -22,33 +22,32 @@ class Clock:
 
 
 class FakePage:
-    """Pages that show ``wanted``, and take batches while ``takes`` is set."""
+    """Pages that show ``wanted``, and take batches while ``can_take`` is set."""
 
     def __init__(self, clock: Clock, wanted=(EVERYTHING,)) -> None:
-        self.clock, self.wanted, self.calls = clock, tuple(wanted), []
+        self.clock, self.wanted = clock, tuple(wanted)
         self.is_alive = self.can_take = True
         self.batches: List[Batch] = []
         self.times_s: List[float] = []
-        self.answers: List[object] = []
+        self.answers: List[Any] = []
         self.on_wait = None
+        self._calls: List[tuple] = []
 
     def send(self, batch: Batch) -> None:
         self.batches.append(batch)
         self.times_s.append(self.clock.now_s)
 
-    def answer(self, call: Call, value: object) -> None:
-        self.answers.append(value)
-
-    def poll(self) -> None:
-        pass
+    def serve(self, actions) -> None:
+        calls, self._calls = self._calls, []
+        self.answers += [actions.call(*call) for call in calls]
 
     def wait(self, timeout_s: float) -> None:
         self.clock.now_s += timeout_s
         if self.on_wait is not None:
             self.on_wait(self)
 
-    def do(self, name: str, **arguments) -> None:
-        self.calls = [*self.calls, Call(0, name, arguments)]
+    def do(self, name: str, *arguments) -> None:
+        self._calls.append((name, *arguments))
 
     @property
     def state(self) -> FleetState:

@@ -4,20 +4,12 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
-from typing import Callable, Optional
-
-import numpy as np
+from typing import Optional
 
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.loop.navigator_group import LocatedScan, LoopRobot
 from quad_nav.navigator.tick import RobotPoses
 from quad_nav.offline.flight import Flight, FlightObserver
-
-
-def with_ranges(scan: Scan, change: Callable[[np.ndarray], None]) -> Scan:
-    ranges_m = scan.ranges_m.copy()
-    change(ranges_m)
-    return replace(scan, ranges_m=ranges_m)
 
 
 class SensorFault(FlightObserver):
@@ -42,11 +34,10 @@ class SensorFault(FlightObserver):
         return self.begin_s <= now_s < self.end_s
 
     def add_scan(self, scan, map_from_lidar, now_s):
-        located_scan = (
-            self.faulty_scan(scan, map_from_lidar)
-            if self.is_on(now_s)
-            else self.healthy_scan(scan, map_from_lidar)
-        )
+        if self.is_on(now_s):
+            located_scan = self.faulty_scan(scan, map_from_lidar)
+        else:
+            located_scan = self.last_healthy = scan, map_from_lidar
         if located_scan is not None:
             self._add_scan(*located_scan, now_s)
 
@@ -56,10 +47,6 @@ class SensorFault(FlightObserver):
         return self.faulty_tick(now_s, state, peers)
 
     def faulty_scan(self, scan: Scan, map_from_lidar: Pose3D) -> Optional[LocatedScan]:
-        return scan, map_from_lidar
-
-    def healthy_scan(self, scan: Scan, map_from_lidar: Pose3D) -> Optional[LocatedScan]:
-        """Handle a scan while there is no fault."""
         return scan, map_from_lidar
 
     def faulty_tick(self, now_s, state, peers):
@@ -79,29 +66,18 @@ class NoScans(SensorFault):
         return None
 
 
-class _StoredScan(SensorFault):
-    """Stores the last scan before the fault."""
-
-    stored: Scan
-
-    def healthy_scan(self, scan, map_from_lidar):
-        self.stored = scan
-        self.stored_pose = map_from_lidar
-        return scan, map_from_lidar
-
-
-class FrozenScans(_StoredScan):
-    """The same scan with new stamps: its obstacles move with the robot."""
+class FrozenScans(SensorFault):
+    """The last scan with new stamps: its obstacles move with the robot."""
 
     def faulty_scan(self, scan, map_from_lidar):
-        return replace(self.stored, stamp_s=scan.stamp_s), map_from_lidar
+        return replace(self.last_healthy[0], stamp_s=scan.stamp_s), map_from_lidar
 
 
-class OldScans(_StoredScan):
-    """The same scan with its old stamp."""
+class OldScans(SensorFault):
+    """The last scan with its old stamp."""
 
     def faulty_scan(self, scan, map_from_lidar):
-        return self.stored, self.stored_pose
+        return self.last_healthy
 
 
 class LateScans(SensorFault):
@@ -126,10 +102,9 @@ class ScansOf(SensorFault):
         self._value, self._first_half = value, first_half
 
     def faulty_scan(self, scan, map_from_lidar):
-        def fill(ranges_m):
-            ranges_m[: len(ranges_m) // 2 if self._first_half else None] = self._value
-
-        return with_ranges(scan, fill), map_from_lidar
+        ranges_m = scan.ranges_m.copy()
+        ranges_m[: len(ranges_m) // 2 if self._first_half else None] = self._value
+        return replace(scan, ranges_m=ranges_m), map_from_lidar
 
 
 class NoPose(SensorFault):
@@ -138,8 +113,8 @@ class NoPose(SensorFault):
     def faulty_tick(self, now_s, state, peers):
         if now_s - self.begin_s <= self._configuration.local_costmap.transform_tolerance_s:
             return self._navigate(now_s, state, peers)
-        located, tracks = RobotPoses(None, None), self._robot.scan_filters.tracks(now_s)
-        return self._robot.navigator.tick(now_s, located, state.twist, peers, tracks), located
+        located = RobotPoses(None, None)
+        return self._robot.tick(now_s, located, state.twist, peers), located
 
 
 class ShiftedPose(SensorFault):

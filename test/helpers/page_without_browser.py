@@ -11,8 +11,7 @@ from nicegui.app.app import State
 from nicegui.page import page as nicegui_page
 
 from quad_web.page import Page
-from quad_web.page_client import LABELS
-from quad_web.view.actions import Actions, Answer, GoalFileView, ParameterView, Role
+from quad_web.view.actions import LABELS, READS, Actions, Answer, GoalFileView, ParameterView, Role
 from quad_web.view.state import FleetState
 
 PARAMETERS = (
@@ -27,7 +26,7 @@ PARAMETERS = (
 class Recorded(Actions):
     """Does nothing, and keeps each call that would change something."""
 
-    available = frozenset(LABELS)
+    available = frozenset({*LABELS, *READS})
 
     def __init__(self) -> None:
         self.calls: List[Any] = []

@@ -220,7 +220,7 @@ class NavigatorMachine(RuleBasedStateMachine):
         seconds = world.flown_s - self.quiet_s
         if fleet is None or self.is_disturbed or seconds < WATCHED_S or not world.walkers:
             return
-        tracks, walker = fleet.robots[0]._scan_filters.tracks(world.now_s), world.walkers[0]
+        tracks, walker = fleet.robots[0].scan_filters.tracks(world.now_s), world.walkers[0]
         if tracks is None:
             return
         for x_m, y_m, vx_mps, vy_mps in tracks.at(world.now_s).states.tolist():

@@ -33,12 +33,9 @@ def test_the_spread_is_half_the_range_between_the_quartiles():
     assert figure(5.0, 1.0, 2.0, 4.0, 3.0).median == 3.0
     assert figure(5.0, 1.0, 2.0, 4.0, 3.0).spread == 1.0  # quartiles 2 and 4
     assert figure(7.0).spread == 0.0
-
-
-@pytest.mark.parametrize("values", [(), (1.0, float("nan")), (float("inf"),)])
-def test_a_figure_has_finite_values(values):
-    with pytest.raises(ValueError, match="plan"):
-        figure(*values)
+    for values in ((), (1.0, float("nan"))):
+        with pytest.raises(ValueError, match="plan"):
+            figure(*values)
 
 
 def test_a_change_counts_beyond_both_spreads_together():
@@ -48,23 +45,20 @@ def test_a_change_counts_beyond_both_spreads_together():
     assert (found.percent, found.noise_percent, found.verdict) == (25.0, 20.0, -1)
 
 
-def test_a_change_counts_beyond_the_tolerance():
-    assert change(figure(100.0), figure(105.0)).verdict == 0
-    assert change(figure(100.0), figure(105.5)).verdict == -1
-    assert change(figure(100.0), figure(105.5), tolerance_percent=6.0).verdict == 0
-
-
-@pytest.mark.parametrize("better, verdict", [(SMALLER, 1), (LARGER, -1)])
-def test_less_is_better_or_worse(better, verdict):
-    before, after = figure(10.0, better=better), figure(8.0, better=better)
-    assert change(before, after).verdict == verdict
-    assert change(after, before).verdict == -verdict
-
-
-def test_a_median_of_zero_can_be_compared():
-    assert change(figure(0.0), figure(0.0)).verdict == 0
-    assert change(figure(0.0), figure(1.0)).verdict == -1
-    assert change(figure(1.0), figure(0.0)).percent == -100.0
+@pytest.mark.parametrize(
+    "before, after, better, verdict",
+    [
+        (100.0, 105.0, SMALLER, 0),  # the tolerance is 5 %
+        (100.0, 105.5, SMALLER, -1),
+        (8.0, 10.0, LARGER, 1),
+        (10.0, 8.0, LARGER, -1),
+        (0.0, 0.0, SMALLER, 0),
+        (0.0, 1.0, SMALLER, -1),
+    ],
+)
+def test_verdicts_of_single_values(before, after, better, verdict):
+    given = figure(before, better=better), figure(after, better=better)
+    assert change(*given).verdict == verdict
 
 
 def test_scripts_share_a_file(tmp_path):
@@ -75,17 +69,9 @@ def test_scripts_share_a_file(tmp_path):
     assert content["format"] == figures.FORMAT
     assert content["machine"]["cores"] >= 1 and content["machine"]["cpu"]
     assert set(content["versions"]) >= {"quad", "numba", "numpy", "python"}
-    assert content["scripts"]["navigation"]["figures"] == [
-        {
-            "name": "plan",
-            "unit": "ms",
-            "better": "smaller",
-            "repetitions": 3,
-            "median": 5.0,
-            "spread": 1.0,
-            "values": [3.0, 5.0, 7.0],
-        }
-    ]
+    (plan,) = content["scripts"]["navigation"]["figures"]
+    assert plan.items() >= {"name": "plan", "unit": "ms", "better": "smaller"}.items()
+    assert (plan["median"], plan["spread"], plan["values"]) == (5.0, 1.0, [3.0, 5.0, 7.0])
     assert content["scripts"]["flight"]["figures"][0]["better"] == "larger"
 
 
@@ -137,9 +123,7 @@ def test_doubtful_comparisons_are_remarked(tmp_path):
     "text",
     [
         "",
-        "[]",
         '{"format": "other"}',
-        json.dumps({"format": figures.FORMAT}),
         json.dumps({"format": figures.FORMAT, "scripts": {"a": {"figures": [{"name": "b"}]}}}),
         json.dumps({"format": figures.FORMAT, "scripts": {}}),
     ],

@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 import datetime
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -24,37 +25,9 @@ import targets  # noqa: E402
 
 CORPUS = sorted(path for path in (FUZZ / "corpus").rglob("*") if path.is_file())
 CONFIG = Path(__file__).parents[2] / "config" / "default"
-ODD = [
-    None,
-    True,
-    0,
-    -1,
-    1e-300,
-    1e300,
-    -1e300,
-    float("inf"),
-    float("nan"),
-    10**40,
-    2**31,
-    "",
-    "x",
-    "1",
-    "$\\frac{",
-    "\x1b[2J",
-    "\ud800",
-    "a" * 5000,
-    "../../etc/passwd",
-    "/dev/zero",
-    "a\0b",
-    [],
-    [[]],
-    [1],
-    [1, 2, 3, 4],
-    ["a"],
-    {},
-    {"a": {"b": []}},
-    [{}],
-]
+ODD = [None, True, 0, -1, 1e-300, 1e300, -1e300, float("inf"), float("nan"), 10**40, 2**31]
+ODD += ["", "x", "1", "$\\frac{", "\x1b[2J", "\ud800", "a" * 5000, "../../etc/passwd", "/dev/zero"]
+ODD += ["a\0b", [], [[]], [1], [1, 2, 3, 4], ["a"], {}, {"a": {"b": []}}, [{}]]
 ODD_YAML = [*(value for value in ODD if value != "\ud800"), datetime.date(2001, 1, 1), b"\xff"]
 
 quick = settings(
@@ -76,15 +49,9 @@ def test_every_target_has_a_corpus():
 def places(tree, above=()):
     """The ways to every part of a document, the whole first."""
     yield above
-    below = (
-        tree.items()
-        if isinstance(tree, dict)
-        else enumerate(tree)
-        if isinstance(tree, list)
-        else ()
-    )
-    for key, value in below:
-        yield from places(value, (*above, key))
+    if isinstance(tree, (dict, list)):
+        for key, value in tree.items() if isinstance(tree, dict) else enumerate(tree):
+            yield from places(value, (*above, key))
 
 
 @st.composite
@@ -119,28 +86,23 @@ def as_yaml(tree):
     return yaml.safe_dump(tree, allow_unicode=True).encode()
 
 
+YAMLS = [("scene", "scene/usual"), ("map_yaml", "map_yaml/usual"), ("map_yaml", "map_yaml/scene")]
+
+
 @quick
 @given(changed(json.loads(corpus("goals/usual.json")), ODD))
 def test_goals(tree):
     targets.run("goals", json.dumps(tree).encode())
 
 
-@quick
-@given(changed(yaml.safe_load(corpus("scene/usual.yaml")), ODD_YAML))
-def test_scenes(tree):
-    targets.run("scene", as_yaml(tree))
+@pytest.mark.parametrize("target, name", YAMLS)
+def test_scenes_and_maps(target, name):
+    @quick
+    @given(changed(yaml.safe_load(corpus(f"{name}.yaml")), ODD_YAML))
+    def check(tree):
+        targets.run(target, as_yaml(tree))
 
-
-@quick
-@given(changed(yaml.safe_load(corpus("map_yaml/usual.yaml")), ODD_YAML))
-def test_maps(tree):
-    targets.run("map_yaml", as_yaml(tree))
-
-
-@quick
-@given(changed(yaml.safe_load(corpus("map_yaml/scene.yaml")), ODD_YAML))
-def test_scenes_of_maps(tree):
-    targets.run("map_yaml", as_yaml(tree))
+    check()
 
 
 @pytest.mark.slow
@@ -158,42 +120,17 @@ def test_parameters(name):
     check()
 
 
+WORLD_PARTS = """
+<model name='a'>|</model>|<link>|</link>|<collision>|</collision>|<geometry>|</geometry>|<box/>
+<box><size>1 1 1</size></box>|<pose>1 2</pose>|<pose>nan inf 0 1e300 0 0</pose>|<plane/>
+<pose>1 2 .5 0 0 0</pose>|<sphere><radius>-1</radius></sphere>|<include/>|<state>|</state>
+<cylinder><radius>1e-300</radius><length>1</length></cylinder>|&amp;|&x;|<!--|<![CDATA[|\0
+<include><uri>model://a</uri></include>|<include><uri>fuzz.world</uri></include>
+"""
+
+
 @quick
-@given(
-    st.lists(
-        st.sampled_from(
-            [
-                "<model name='a'>",
-                "</model>",
-                "<link>",
-                "</link>",
-                "<collision>",
-                "</collision>",
-                "<geometry>",
-                "</geometry>",
-                "<box><size>1 1 1</size></box>",
-                "<box/>",
-                "<pose>1 2</pose>",
-                "<pose>nan inf 0 1e300 0 0</pose>",
-                "<pose>1 2 .5 0 0 0</pose>",
-                "<sphere><radius>-1</radius></sphere>",
-                "<cylinder><radius>1e-300</radius><length>1</length></cylinder>",
-                "<include><uri>model://a</uri></include>",
-                "<include><uri>fuzz.world</uri></include>",
-                "<include/>",
-                "<state>",
-                "</state>",
-                "<plane/>",
-                "&amp;",
-                "&x;",
-                "<!--",
-                "<![CDATA[",
-                "\0",
-            ]
-        ),
-        max_size=30,
-    )
-)
+@given(st.lists(st.sampled_from(re.split(r"[|\n]", WORLD_PARTS.strip())), max_size=30))
 def test_worlds(parts):
     targets.run(
         "world", f"<sdf version='1.6'><world name='w'>{''.join(parts)}</world></sdf>".encode()

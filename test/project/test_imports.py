@@ -36,19 +36,7 @@ LAYERS = [
     {"cli"},
 ]
 # Navigation and the simulator do not import each other.
-WORLD_USERS = {
-    "sim",
-    "mission",
-    "scenario",
-    "topics",
-    "loop",
-    "offline",
-    "recording",
-    "report",
-    "cli",
-    "ros",
-    "api",
-}
+WORLD_USERS = set("sim mission scenario topics loop offline recording report cli ros api".split())
 # (importing module, imported add-on): an add-on imports another one in these modules alone.
 BETWEEN_ADD_ONS = {("quad_tune/barn_course.py", "quad_bench")}
 
@@ -100,18 +88,19 @@ def test_every_package_is_the_core_or_an_add_on():
     assert {path.parent.name for path in SOURCES.glob("*/__init__.py")} <= {CORE, *ADD_ONS}
 
 
-NODES_WITHOUT_BODIES = {
-    "quad_nav": "quad_nav.ros.sequencer.node",
-    "quad_web": "quad_web.ros.node",
-    "quad_vehicles": "quad_vehicles.ros.fleet, quad_vehicles.ros.node",
-}
-
-
-@pytest.mark.parametrize("package", NODES_WITHOUT_BODIES)
-def test_nodes_without_bodies_do_not_load_the_physics_engine(package):
+@pytest.mark.parametrize(
+    ("node", "unloaded"),
+    [
+        ("quad_nav.ros.sequencer.node", "pybullet"),
+        ("quad_web.ros.node", "pybullet"),
+        ("quad_vehicles.ros.fleet", "pybullet"),
+        ("quad_vehicles.ros.node", "numba"),
+    ],
+)
+def test_nodes_do_not_load_engine_or_kernels_that_they_do_not_need(node, unloaded):
     pytest.importorskip("rospy")
-    pytest.importorskip(package)
-    script = f"import sys, {NODES_WITHOUT_BODIES[package]}; assert 'pybullet' not in sys.modules"
+    pytest.importorskip(node.partition(".")[0])
+    script = f"import sys, {node}; assert not {{'pybullet', {unloaded!r}}} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", script], check=True, env=ENVIRONMENT)
 
 

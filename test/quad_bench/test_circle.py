@@ -10,7 +10,6 @@ import pytest
 from click.testing import CliRunner
 
 from quad_bench.circle.orca import Orca, OrcaParams
-from quad_bench.circle.picture import PathsPanel, paths_figure
 from quad_bench.circle.results import (
     CircleResults,
     circle_statistics,
@@ -24,7 +23,6 @@ from quad_bench.circle.setup import (
     METHODS,
     CircleOptions,
     circle_starts,
-    fitting_radius_m,
     read_circles,
 )
 from quad_bench.cli import circle as command
@@ -58,11 +56,6 @@ def test_goals_are_the_starts_of_those_opposite():
     assert [robot.sequence.goals[0].x_m for robot in circle.flight.robots] == [
         x_m for x_m, _ in circle.goals_m
     ]
-
-
-@pytest.mark.parametrize("robots, radius_m", [(4, 4.0), (16, 4.0), (17, 8.0), (40, 8.0)])
-def test_the_circle_that_fits(robots, radius_m):
-    assert fitting_radius_m(robots) == radius_m
 
 
 @needs_orca
@@ -133,13 +126,6 @@ def test_a_track_measures_arrival_detour_and_gap():
     assert (run.arrived, run.succeeded, run.last_arrival_s) == (1, False, None)
 
 
-def test_hulls_that_overlap_touch():
-    track = Track(np.array([[0.0, 0.0], [3.0, 0.0]]), np.array([[3.0, 0.0], [0.0, 0.0]]), 0.25)
-    track.add(1.0, np.array([[1.0, 0.0], [1.4, 0.0]]))
-    track.add(2.0, np.array([[1.0, 0.0], [1.3, 0.0]]))
-    assert track.touching == {(0, 1): 1.0} and track.gap_m == pytest.approx(-0.2)
-
-
 @needs_orca
 @pytest.mark.parametrize("fly", [fly_orca, fly_orca_points])
 def test_two_swap_sides_by_orca(fly):
@@ -206,13 +192,6 @@ def test_results_as_text_json_and_csv():
     assert figures["figures"][0]["successes"] == 2 and figures["runs"][2]["contacts"]
     json.dumps(figures, allow_nan=False)
     assert len(to_csv(results).splitlines()) == 5
-
-
-def test_the_picture_has_a_panel_for_each_flight():
-    panel = PathsPanel("one", np.zeros((3, 2, 2)), [(1.0, 0.0), (-1.0, 0.0)], 0.3)
-    figure = paths_figure([panel, replace(panel, title="two")], 3)
-    titles = {axes.get_title() for axes in figure.axes}
-    assert titles >= {"one", "two"}
 
 
 @needs_orca

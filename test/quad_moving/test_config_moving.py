@@ -40,15 +40,7 @@ def test_the_filters_have_the_parameters_of_their_namespaces():
     "name, value, problem",
     [
         ("speed", 1.0, "evasion/speed: unknown; expected one of clearance, max_speed"),
-        (
-            "max_speed",
-            "fast",
-            "evasion/max_speed: 'fast' is not a number; expected a number of m/s",
-        ),
-        ("clearance", -1, "evasion/clearance: -1 is out of range; expected a number of m"),
         ("clearance", 3.0, "evasion/clearance: 3.0 is out of range; expected 0 to 2 m"),
-        ("clearance", True, "evasion/clearance: True is not a number"),
-        ("clearance", float("nan"), "evasion/clearance: nan is not finite"),
     ],
 )
 def test_a_wrong_parameter_is_refused(name, value, problem):

@@ -8,14 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from quad_moving.evasion import (
-    BODY,
-    Evasion,
-    EvasionParams,
-    obstacles_of,
-    polar_grid,
-    usual_speed_mps,
-)
+from quad_moving.evasion import BODY, Evasion, usual_speed_mps
 from quad_moving.reachable import Body, Flight, Obstacles, Standing, needed_accelerations
 from quad_nav.config.plugins import Parameters
 from quad_nav.control.dwa_planner_params import DwaParams
@@ -24,7 +17,6 @@ from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL, GridSpec
 from quad_nav.navigator.command_filter import Command, Situation, StopReason
-from quad_nav.peers.right_of_way import MOVING_OBSTACLE
 
 HERE = Pose2D(0.0, 0.0)
 AHEAD = Twist2D(vx_mps=0.5)
@@ -32,7 +24,14 @@ HOVER = Command(Twist2D(), StopReason.IDLE)
 PLANNER = TrajectoryPlannerParams(holonomic_robot=True, max_vel_x_mps=0.5)
 PLAIN = {"max_speed": 1.0, "horizon": 3.0, "max_acceleration": 0.0}
 PEOPLE = {"max_speed": 1.0, "horizon": 0.0, "max_acceleration": 6.0}
-ALONE = SimpleNamespace(limit_velocities=lambda velocities, *_: velocities)
+
+
+def peers_that(limit):
+    """Peers whose Voronoi cell limits velocities in a way."""
+    return SimpleNamespace(cell=lambda *_: SimpleNamespace(limit_velocities=limit))
+
+
+ALONE = peers_that(lambda velocities: velocities)
 SPEC = GridSpec(160, 160, 0.05, -4.0, -4.0)
 
 
@@ -82,23 +81,6 @@ def test_an_obstacle_needs_an_acceleration_to_touch_a_hovering_robot():
     assert needed([0.0, 0.0], [1.5, 0.0, 0.0, 0.0]) == pytest.approx(2.0 / 9.0)
 
 
-def test_an_obstacle_that_comes_needs_none():
-    """At 1 m/s it is 0.5 m away after 1 s, and on the robot then: -2 * 0.5 m / (1.5 s)^2."""
-    found = needed([0.0, 0.0], [1.5, 0.0, -1.0, 0.0])
-    assert found == pytest.approx(-2.0 * 0.5 / 1.5**2, rel=0.02)
-
-
-def test_nobody_is_farther_than_a_walk():
-    """3 s at 1.6 m/s are 4.8 m."""
-    assert needed([0.0, 0.0], [5.4, 0.0, 0.0, 0.0]) == math.inf
-    assert needed([0.0, 0.0], [5.2, 0.0, 0.0, 0.0]) == pytest.approx(2.0 * 4.7 / 9.0)
-
-
-def test_a_robot_may_fly_away_from_what_it_touches():
-    touching = [0.3, 0.0, 0.0, 0.0]
-    assert needed([-1.0, 0.0], touching, (-1.0, 0.0)) > 0.0 > needed([1.0, 0.0], touching)
-
-
 def test_a_robot_at_rest_may_be_touched_if_it_rests():
     coming = [1.5, 0.0, -1.0, 0.0]
     assert needed([0.0, 0.0], coming, rests=True) == math.inf
@@ -122,49 +104,15 @@ def test_a_command_after_which_the_robot_cannot_stop_before_a_wall_is_none():
         assert bool(found == math.inf) is stops
 
 
-def test_obstacles_are_tracks_and_what_may_move():
-    seen = tracks([2.0, 0.0, -2.0, 0.0], suspects=[[1.0, 1.0, 0.0, 0.0, 0.3]])
-    found = obstacles_of(EvasionParams(), seen, Pose2D(0.5, 0.0), 0.45)
-    np.testing.assert_allclose(found.states, [[1.5, 0.0, -2.0, 0.0], [0.5, 1.0, 0.0, 0.0]])
-    np.testing.assert_allclose(found.radii_m, [0.7, 0.75])
-    np.testing.assert_allclose(found.speeds_mps, [2.0, 1.6])
-    assert seen.states[0, 0] == 2.0
-
-
-def test_the_grid_has_the_hover_and_all_courses():
-    grid = polar_grid(2.0)
-    assert grid.shape == (1 + 6 * 32, 2)
-    assert grid[0].tolist() == [0.0, 0.0] and np.hypot(*grid.T).max() == pytest.approx(2.0)
-
-
 def test_nothing_that_moves_leaves_the_command_as_it_is():
     command = Command(AHEAD)
     assert evade(command, tracks()) is command
     assert evade(command, None) is command
 
 
-def test_an_obstacle_that_passes_leaves_the_command_as_it_is():
-    command = Command(AHEAD)
-    assert evade(command, tracks([3.0, 2.5, -1.0, 0.0])) is command
-
-
-def test_a_hovering_robot_evades_to_the_nearer_side():
-    found = evade(HOVER, tracks([2.0, 0.2, -1.0, 0.0]))
-    assert found.velocity.vy_mps < -0.2 and found.stop is None
-    assert found.limited_by == MOVING_OBSTACLE
-
-
-def test_commands_are_in_the_robots_frame():
-    turned = Pose2D(0.0, 0.0, math.pi / 2)
-    found = evade(HOVER, tracks([2.0, 0.2, -1.0, 0.0]), pose=turned)
-    assert found.velocity.vx_mps < -0.2
-
-
 def test_a_peer_closes_a_side():
     """Of velocities to the right nothing is left."""
-    right = SimpleNamespace(
-        limit_velocities=lambda velocities, *_: np.where(velocities[:, 1:] < -0.01, 0.0, velocities)
-    )
+    right = peers_that(lambda velocities: np.where(velocities[:, 1:] < -0.01, 0.0, velocities))
     found = evade(HOVER, tracks([2.0, 0.2, -1.0, 0.0]), peers=right)
     assert found.velocity.vy_mps > -0.01 and not found.velocity.is_zero
 
@@ -204,11 +152,6 @@ def test_a_robot_that_is_fast_from_an_evasion_brakes_before_a_wall():
     assert evasion.filter(Command(AHEAD), fast).velocity.vx_mps <= 0.0
 
 
-def test_a_robot_that_is_too_near_to_what_stands_is_left_to_the_navigator():
-    costs, command = np.full(SPEC.shape, LETHAL, np.uint8), Command(AHEAD)
-    assert evade(command, tracks([2.0, 0.0, -1.0, 0.0]), costs=costs) is command
-
-
 def test_a_robot_among_people_stands_while_somebody_can_reach_it():
     command = Command(AHEAD)
     near, far = tracks([1.1, 0.0, -1.0, 0.0]), tracks([3.5, 0.0, -1.0, 0.0])
@@ -222,11 +165,6 @@ def test_a_robot_among_people_that_cannot_rest_in_time_brakes():
         Command(AHEAD), tracks([1.0, 0.0, -1.2, 0.0]), PEOPLE, velocity=Twist2D(1.0, -0.3)
     )
     assert (found.velocity.vx_mps, found.velocity.vy_mps) == (-1.0, 0.3)
-
-
-def test_who_has_stopped_may_walk_on():
-    stands = tracks(suspects=[[0.9, 0.0, 0.0, 0.0, 0.25]])
-    assert evade(Command(AHEAD), stands, PEOPLE, velocity=AHEAD).velocity.vx_mps <= 0.0
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from test_tracking import LIDAR, ON, PILLARS, new_tracker, pose_at, scan_of, times, track
+from test_tracking import ON, PILLARS, pose_at, times, track
 
 RADIUS_M = 0.3
 
@@ -29,26 +29,6 @@ def test_who_has_stopped_is_a_suspect():
     np.testing.assert_allclose(tracks.suspects, [(3.0, 0.0, 0.0, 0.0, RADIUS_M)], atol=0.05)
 
 
-def test_who_creeps_is_followed():
-    """At 0.1 m/s it has no track and comes 0.8 m far."""
-    for now_s, _, tracker in track(lambda t: stops(t, 0.1), times(10.0), params=ON):
-        if now_s > 5.0:
-            place = (3.0, 0.1 * (now_s - 2.0))
-            assert len(tracker.known) == 0
-            np.testing.assert_allclose(tracker.known.suspects[:, :2], [place], atol=0.08)
-
-
-def test_who_walks_on_is_followed_until_it_has_a_track():
-    known = []
-    for now_s, _, tracker in track(lambda t: stops(t, 1.0, 6.0), times(7.5), params=ON):
-        tracks, place = tracker.known, stops(now_s, 1.0, 6.0)[0][:2]
-        rows = np.concatenate([tracks.states, tracks.suspects[:, :4]])
-        if now_s > 5.0:
-            known.append(np.hypot(*(rows[:, :2] - place).T).min())
-    assert max(known) < 0.2
-    assert len(tracks) == 1 and len(tracks.suspects) == 0
-
-
 def test_what_moves_for_the_first_time_is_a_suspect_before_it_is_a_track():
     first = {}
     for now_s, _, tracker in track(
@@ -58,13 +38,6 @@ def test_what_moves_for_the_first_time_is_a_suspect_before_it_is_a_track():
             if len(rows):
                 first.setdefault(kind, now_s)
     assert 1.0 < first["suspect"] < first["track"] < 2.0
-
-
-def test_who_came_without_a_track_and_stands_is_a_suspect():
-    """As one who halts in a crowd while the track goes on with another."""
-    tracks = last(lambda t: ((3.0, 0.0, RADIUS_M),) if t > 1.0 else (), 5.0)
-    assert len(tracks) == 0
-    np.testing.assert_allclose(tracks.suspects, [(3.0, 0.0, 0.0, 0.0, RADIUS_M)], atol=0.05)
 
 
 @pytest.mark.parametrize("noise_m", [0.0, 0.02])
@@ -94,13 +67,3 @@ def test_who_is_hidden_is_known_as_long_as_earlier_scans(until_s, known):
     tracks = last(lambda t: (*stops(t), *(((1.5, 0.0, 0.5),) if t > 6.0 else ())), until_s)
     near = np.hypot(*(tracks.suspects[:, :2] - (3.0, 0.0)).T) < 0.1
     assert near.sum() == known
-
-
-@pytest.mark.parametrize("peer_x_m, known", [(3.45, 1), (3.25, 0)])
-def test_a_peer_beside_it_is_another_one(peer_x_m, known):
-    """Its circle of 0.5 m is known; who halted stands in the inner 0.3 m of none."""
-    tracker = new_tracker()
-    for now_s in times(6.0):
-        peers = np.array([(peer_x_m, 0.0, 0.5)]) if now_s > 5.5 else np.empty((0, 3))
-        tracker.add_scan("scan", scan_of(now_s, stops(now_s)), LIDAR, known_circles=peers)
-    assert len(tracker.known.suspects) == known

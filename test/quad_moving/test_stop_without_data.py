@@ -11,7 +11,6 @@ import pytest
 from flight_faults import NoPose, NoScans
 from test_navigator import GOAL, HERE, FakeRecovery, Flight
 from test_tracking_flights import walker
-from upstream import UPSTREAM
 
 from quad_moving.evasion import Evasion
 from quad_nav.config.plugins import Parameters
@@ -102,10 +101,6 @@ def old_costmap(flight):
     return BOTH, "local costmap out of date"
 
 
-def no_pose(flight):
-    return RobotPoses(None, None), "robot pose unknown"
-
-
 def no_odometry(flight):
     return RobotPoses(None, None, "no message on /odom0 for 0.6 s"), "no message on /odom0"
 
@@ -114,13 +109,7 @@ def no_local_pose(flight):
     return RobotPoses(HERE, None), "robot pose unknown"
 
 
-def no_global_pose(flight):
-    return RobotPoses(None, HERE), "robot pose unknown"
-
-
-@pytest.mark.parametrize(
-    "lose", [no_scans, old_costmap, no_pose, no_odometry, no_local_pose, no_global_pose]
-)
+@pytest.mark.parametrize("lose", [no_scans, old_costmap, no_odometry, no_local_pose])
 @pytest.mark.parametrize("does", [controls, recovers, plans, hovers, yields])
 def test_every_command_of_a_robot_without_data_is_zero(does, lose):
     flight = Threatened()
@@ -137,52 +126,6 @@ def test_every_command_of_a_robot_without_data_is_zero(does, lose):
     assert lines and all(reason in line for line in lines)
     periods = np.diff([tick.now_s for tick in ticks if tick.command])
     assert all(periods > 0.1 - 1e-6)  # the control period
-
-
-@pytest.mark.parametrize("lose", [no_scans, no_pose])
-def test_a_cancel_without_data_is_a_stop(lose):
-    flight = Threatened()
-    controls(flight)
-    flight.ticks(2.0)
-    poses, _ = lose(flight)
-    flight.navigator.cancel()
-    ticks = flight.ticks(2.0, poses)
-    assert [tick.command for tick in ticks if tick.command] == [Twist2D()]
-
-
-def test_a_robot_that_hovers_without_data_says_nothing():
-    """It had nothing to stop."""
-    flight = Threatened()
-    no_scans(flight)
-    assert all(tick.command is None and not tick.warnings for tick in flight.ticks(2.0))
-
-
-def test_with_data_again_it_goes_on():
-    flight = Threatened()
-    recovers(flight)
-    flight.threat = False
-    flight.ticks(2.0)
-    flight.ticks(1.0, RobotPoses(None, None))
-    turning = Twist2D(vyaw_radps=1.0)
-    assert turning in [tick.command for tick in flight.ticks(0.2)]
-    flight = Threatened()
-    flight.ticks(1.0)
-    no_scans(flight)
-    flight.ticks(1.0)
-    flight.local_costmap.stale = []
-    assert any(tick.limited_by for tick in flight.ticks(0.2))
-
-
-def test_upstream_goes_on_recovering_without_scans_and_does_not_evade():
-    flight = Threatened(UPSTREAM)
-    recovers(flight)
-    flight.threat = False
-    flight.ticks(2.0)
-    no_scans(flight)
-    turning = Twist2D(vyaw_radps=1.0)
-    assert turning in [tick.command for tick in flight.ticks(1.0)]
-    flight.threat = True
-    assert all(tick.command in (None, turning, Twist2D()) for tick in flight.ticks(1.0))
 
 
 @pytest.mark.parametrize("frequency_hz", [2.0, 20.0])
@@ -250,10 +193,3 @@ def test_nothing_moves_a_quadcopter_that_has_lost_its_data(config, goal, fault, 
     limit_s = BEGIN_S + TIMEOUT_S + CONTROL_PERIOD_S
     assert any(tick.limited_by for tick in commands.ticks if tick.now_s < limit_s)
     assert commands.moves(limit_s) == []
-
-
-def test_tracks_end_in_flight_without_scans(tmp_path):
-    lost_after_s = 4.0  # of config/moving
-    commands = fly(tmp_path, "moving", HOVERS, NoScans(BEGIN_S, 1e9))
-    known_s = [now_s for now_s, count in commands.tracks if count]
-    assert BEGIN_S < max(known_s) <= BEGIN_S + lost_after_s

@@ -8,8 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quad_moving.association import assign
-from quad_moving.discs import Outlines
 from quad_moving.moving_points import TrackerParams
 from quad_moving.tracker import Tracker
 from quad_nav.config.plugins import Parameters
@@ -20,10 +18,6 @@ STEP_RAD = 2.0 * math.pi / BEAMS
 ON = TrackerParams(range_m=10.0, lost_after_s=1.5)
 LIDAR = Pose3D(0.0, 0.0, 1.0)
 ROOM = (-6.0, -6.0, 6.0, 6.0)
-
-
-def tilted(pitch_rad):
-    return Pose3D(0.0, 0.0, 1.0, (0.0, math.sin(pitch_rad / 2.0), 0.0, math.cos(pitch_rad / 2.0)))
 
 
 def pose_at(x_m, y_m, yaw_rad=0.0):
@@ -93,11 +87,6 @@ def test_a_crossing_cylinder_is_tracked(speed_mps, rate_hz):
     assert tracker.known.radii_m[0] == pytest.approx(0.3, abs=0.05)
 
 
-def test_an_obstacle_that_comes_nearer_is_tracked():
-    *_, (_, _, tracker) = track(lambda t: ((5.0 - t, 0.0, 0.3),), times(2.0))
-    np.testing.assert_allclose(tracker.known.states, [(3.0, 0.0, -1.0, 0.0)], atol=0.1)
-
-
 @pytest.mark.parametrize("older_s", [0.005, 0.03, 0.09, 0.2])
 @pytest.mark.parametrize("speed_mps", [0.5, 1.0, 2.0])
 def test_two_lidars_measure_one_speed(speed_mps, older_s):
@@ -121,7 +110,7 @@ def test_two_lidars_measure_one_speed(speed_mps, older_s):
 
 
 @pytest.mark.parametrize("noise_m", [0.0, 0.02])
-@pytest.mark.parametrize("rate_hz", [5.0, 10.0, 20.0, 40.0])
+@pytest.mark.parametrize("rate_hz", [5.0, 20.0])
 def test_standing_things_do_not_move_for_a_lidar_that_flies_and_turns(noise_m, rate_hz):
     def pose_of(t):
         return pose_at(-1.0 + 0.5 * t, 0.5 * math.sin(t), 0.6 * math.sin(0.7 * t))
@@ -130,10 +119,9 @@ def test_standing_things_do_not_move_for_a_lidar_that_flies_and_turns(noise_m, r
         assert len(tracker.known) == 0
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_a_field_of_thin_pillars_does_not_move(seed):
+def test_a_field_of_thin_pillars_does_not_move():
     """As in BARN: pillars of 0.075 m with gaps, seen from between them."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     places = random.uniform(-5.5, 5.5, (120, 2))
     pillars = [(x_m, y_m, 0.075) for x_m, y_m in places if abs(y_m) > 0.6]
 
@@ -141,20 +129,6 @@ def test_a_field_of_thin_pillars_does_not_move(seed):
         return pose_at(-5.0 + 0.7 * t, 0.2 * math.sin(t), 0.5 * math.sin(1.3 * t))
 
     for _, _, tracker in track(lambda _: pillars, times(12.0, 20.0), pose_of, noise_m=0.01):
-        assert len(tracker.known) == 0
-
-
-def test_nothing_is_clustered_or_tracked_where_nothing_moves():
-    assert all(result is None for _, result, _ in track(lambda _: PILLARS, times(3.0)))
-
-
-def test_a_wall_that_comes_into_view_behind_a_pillar_does_not_move():
-    """The pillar's shadow sweeps over the walls and uncovers a post."""
-    for _, _, tracker in track(
-        lambda _: ((2.0, 0.0, 0.5), (4.0, 0.3, 0.1)),
-        times(8.0),
-        lambda t: pose_at(0.0, -2.0 + 0.5 * t),
-    ):
         assert len(tracker.known) == 0
 
 
@@ -169,13 +143,6 @@ def test_an_obstacle_that_passes_behind_a_pillar_keeps_its_number():
     assert set(numbers) == {1} and any(hidden_s)
 
 
-def test_two_obstacles_that_pass_each_other_keep_their_numbers():
-    *_, (_, _, tracker) = track(lambda t: ((3.0, -3.0 + t, 0.25), (4.2, 3.0 - t, 0.25)), times(6.0))
-    velocities = dict(zip(tracker.known.numbers.tolist(), tracker.known.states[:, 3]))
-    assert set(velocities) == {1, 2}
-    assert sorted(velocities.values()) == pytest.approx([-1.0, 1.0], abs=0.1)
-
-
 def test_who_comes_out_of_a_long_shadow_is_tracked_where_it_was_free_long_ago():
     """One stands at (2, 0) from 4 s to 10 s and hides the other; the shadow is 2.5 m wide there."""
 
@@ -186,42 +153,6 @@ def test_who_comes_out_of_a_long_shadow_is_tracked_where_it_was_free_long_ago():
     for now_s, _, tracker in track(discs_at, times(10.9, 20.0)):
         seen = np.hypot(*(tracker.known.states[:, :2] - (5.0, 10.0 - now_s)).T) < 0.2
     assert seen.any()
-
-
-def test_a_lidar_that_tilts_follows_an_obstacle_that_turns_back():
-    """At 5 m its beams are 0.7 m off the level; with a constant velocity it would be at 0.5 m."""
-    *_, (_, _, tracker) = track(
-        lambda t: ((5.0, -abs(t - 2.0), 0.3),),
-        times(2.5, 20.0),
-        lambda t: tilted(0.14 if t > 2.0 else 0.0),
-    )
-    np.testing.assert_allclose(tracker.known.states[:, :2], [(5.0, -0.5)], atol=0.15)
-
-
-def test_a_lidar_that_tilts_and_looks_over_an_obstacle_does_not_lose_it():
-    """At 5 m its beams are 1 m above the level."""
-    tracks = {}
-    for now_s, _, tracker in track(
-        lambda t: ((5.0, -2.0 + t, 0.3),) if t < 2.0 else (),
-        times(2.6, 20.0),
-        lambda t: tilted(-0.2 if t >= 2.0 else 0.0),
-    ):
-        tracks[round(now_s, 2)] = tracker.known
-    assert tracks[2.6].numbers.tolist() == tracks[1.9].numbers.tolist() == [1]
-    assert tracks[2.6].states[0, 1] == pytest.approx(0.6, abs=0.1)
-
-
-def test_a_part_far_from_a_track_is_not_its_obstacle():
-    """The place is known to 2 m, so that the gate is 7 m wide; the centre of a part is a guess."""
-    states, covariances = np.zeros((1, 4)), np.diag([4.0, 4.0, 1.0, 1.0])[None]
-
-    def pairs(x_m, is_whole):
-        five, usable = np.full(1, 5.0), np.ones(1, bool)
-        seen = Outlines(np.array([[x_m, 0.0]]), 0.06 * five, np.array([is_whole]), five)
-        return assign(states, covariances, seen, usable, 1.0)
-
-    assert pairs(0.95, False) == pairs(5.0, True) == [(0, 0)]
-    assert pairs(1.05, False) == pairs(8.0, True) == []
 
 
 def test_an_obstacle_that_stops_becomes_a_standing_one():
@@ -235,42 +166,10 @@ def test_an_obstacle_that_stops_becomes_a_standing_one():
     assert not last.any_moving  # its beams mark again
 
 
-def test_an_obstacle_that_starts_again_is_tracked_again():
-    for now_s, _, tracker in track(lambda t: ((3.0, max(0.0, t - 5.0), 0.3),), times(6.0)):
-        assert now_s > 5.0 or len(tracker.known) == 0
-    assert tracker.known.states[0, 3] == pytest.approx(1.0, abs=0.15)
-
-
-def test_an_obstacle_that_vanishes_in_sight_is_dropped_at_once():
-    present = []
-    for now_s, _, tracker in track(
-        lambda t: ((3.0, -2.0 + t, 0.3),) if t < 2.0 else (), times(3.0)
-    ):
-        present.append((round(now_s, 1), len(tracker.known)))
-    assert dict(present)[1.9] == 1 and dict(present)[2.5] == 0
-
-
-def test_a_disc_of_which_a_pillar_hides_a_part_keeps_its_centre():
-    """At 0.5 m of its path the pillar hides a half of it."""
-    *_, (_, _, tracker) = track(lambda t: ((2.0, 0.0, 0.3), (4.0, -3.0 + t, 0.4)), times(2.4))
-    np.testing.assert_allclose(tracker.known.states[0, :2], (4.0, -0.6), atol=0.1)
-
-
 def test_moving_beams_are_those_on_confirmed_tracks():
     *_, (now_s, result, _) = track(lambda t: ((3.0, -2.0 + t, 0.3), *PILLARS), times(2.0))
     scan = scan_of(now_s, ((3.0, 0.0, 0.3),), room=(-100.0, -100.0, 100.0, 100.0))
     np.testing.assert_array_equal(result.moving_beams, scan.ranges_m < 4.0)
-
-
-def test_the_scan_that_confirms_a_track_tells_where_the_obstacle_was():
-    vacated = []
-    for now_s, result, _ in track(lambda t: ((3.0, -2.0 + t, 0.3),), times(2.0)):
-        if result is not None and len(result.vacated):
-            vacated.append((now_s, result.vacated))
-    ((confirmed_s, points),) = vacated
-    assert confirmed_s < 1.0
-    assert 2.65 < points[:, 0].min() and points[:, 0].max() < 3.1  # its near side
-    assert -1.8 < points[:, 1].min() < -1.6 and points[:, 1].max() < -1.7 + confirmed_s
 
 
 def test_known_peers_are_not_tracked_and_lost_ones_are():
@@ -284,13 +183,6 @@ def test_known_peers_are_not_tracked_and_lost_ones_are():
     assert tracker.known.states[0, 3] == pytest.approx(1.0, abs=0.1)
 
 
-def test_a_jump_of_the_pose_moves_nothing():
-    for _, _, tracker in track(
-        lambda _: PILLARS, times(6.0), lambda t: pose_at(0.0 if t < 3.0 else 0.4, 0.0)
-    ):
-        assert len(tracker.known) == 0
-
-
 @pytest.mark.parametrize("lost_after_s", [0.5, 1.5, 4.0])
 def test_a_track_ends_by_the_clock(lost_after_s):
     """Nothing scans after 3 s."""
@@ -301,31 +193,6 @@ def test_a_track_ends_by_the_clock(lost_after_s):
     assert tracker.known.numbers.tolist() == number and len(tracker.known.unseen_s) == 1
     tracker.tracks(3.01 + lost_after_s)
     assert not tracker.known.any_may_move and len(tracker.known.unseen_s) == 0
-
-
-def test_who_was_hidden_before_the_scans_ended_is_forgotten_earlier():
-    """It goes behind a pillar after 3 s, and nothing scans after 4 s."""
-    pillar = (2.0, 0.5, 0.5)
-    *_, (_, _, tracker) = track(lambda t: ((3.0, -3.0 + t, 0.2), pillar), times(4.0))
-    hidden_s = tracker.known.unseen_s[0]
-    assert 0.3 < hidden_s < 1.2
-    tracker.tracks(4.0 + 1.5 - hidden_s - 0.01)
-    assert len(tracker.known) == 1
-    tracker.tracks(4.0 + 1.5 - hidden_s + 0.01)
-    assert len(tracker.known) == 0
-
-
-def test_a_track_of_before_a_silence_is_not_continued_elsewhere():
-    """Another obstacle than that of before goes by after 10 s: it has a track of its own speed."""
-
-    def discs(now_s):
-        return ((3.0, -3.0 + now_s, 0.3),) if now_s < 5.0 else ((-3.0, 13.0 - now_s, 0.3),)
-
-    after = [now_s for now_s in times(14.0) if now_s <= 2.0 or now_s >= 12.0]
-    for now_s, _, tracker in track(discs, after):
-        if now_s >= 12.0:
-            assert 1 not in tracker.known.numbers
-    np.testing.assert_allclose(tracker.known.states, [(-3.0, -1.0, 0.0, -1.0)], atol=0.1)
 
 
 @pytest.mark.parametrize("back_s", [0.5, 100.0])
@@ -364,3 +231,30 @@ def test_covariances_are_honest():
     assert len(nees) > 150
     assert 1.0 < np.mean(nees) < 5.0
     assert np.mean(np.array(nees) < 9.49) > 0.95  # chi-square with 4 degrees of freedom
+
+
+def tilted(pitch_rad):
+    return Pose3D(0.0, 0.0, 1.0, (0.0, math.sin(pitch_rad / 2.0), 0.0, math.cos(pitch_rad / 2.0)))
+
+
+def test_a_wall_that_comes_into_view_behind_a_pillar_does_not_move():
+    """The pillar's shadow sweeps over the walls and uncovers a post."""
+    for _, _, tracker in track(
+        lambda _: ((2.0, 0.0, 0.5), (4.0, 0.3, 0.1)),
+        times(8.0),
+        lambda t: pose_at(0.0, -2.0 + 0.5 * t),
+    ):
+        assert len(tracker.known) == 0
+
+
+def test_a_lidar_that_tilts_and_looks_over_an_obstacle_does_not_lose_it():
+    """At 5 m its beams are 1 m above the level."""
+    tracks = {}
+    for now_s, _, tracker in track(
+        lambda t: ((5.0, -2.0 + t, 0.3),) if t < 2.0 else (),
+        times(2.6, 20.0),
+        lambda t: tilted(-0.2 if t >= 2.0 else 0.0),
+    ):
+        tracks[round(now_s, 2)] = tracker.known
+    assert tracks[2.6].numbers.tolist() == tracks[1.9].numbers.tolist() == [1]
+    assert tracks[2.6].states[0, 1] == pytest.approx(0.6, abs=0.1)

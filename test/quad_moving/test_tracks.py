@@ -38,14 +38,3 @@ def test_a_quarter_turn_swaps_the_axes():
     assert np.allclose(turned.covariances[0], np.diag([0.04, 0.01, 0.16, 0.09]))
     assert np.allclose(turned.suspects, [[6.0, 3.0, -0.1, 0.0, 0.25]])
     assert turned.numbers.tolist() == [7] and turned.radii_m.tolist() == [0.3]
-
-
-def test_who_has_halted_may_move():
-    halted = one_track().chosen(np.array([False]))
-    assert len(halted) == 0 and halted.any_may_move
-    assert not Tracks.none(1.0).any_may_move
-
-
-def test_no_tracks_stay_none():
-    none = Tracks.none(1.0).at(2.0).transformed(Pose2D(1.0, 2.0, 3.0))
-    assert len(none) == 0 and none.time_s == 2.0

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from PIL import Image
 
 from quad_bench.barn import arrays
 from quad_nav import errors
@@ -118,26 +117,6 @@ def test_a_map_on_a_topic_takes_a_gigabyte_at_most():
         )
         assert problem.startswith(f"{side + 1} x {side + 1} cells of 48 bytes" if more else "")
         assert bool(problem) == bool(more)
-
-
-@pytest.mark.parametrize(
-    "mode, side", [("L", 10000), ("RGB", 10000), ("LA", 10000), ("RGBA", 9128), ("I", 8770)]
-)
-def test_an_image_takes_a_gigabyte_at_most(tmp_path, mode, side):
-    assert not _image_problem(tmp_path, mode, side)
-    problem = _image_problem(tmp_path, mode, side + 1)
-    assert "of memory; expected 1 GB at most" in problem or "pixels, expected 1 to" in problem
-
-
-def _image_problem(folder, mode, side):
-    """Return the fault in the size of a square image, of which there is only the head."""
-    image = Image.new(mode, (1, 1))
-    image._size = (side, side)
-    try:
-        map_image._check_size(folder / "map.png", image)
-    except InputError as error:
-        return str(error)
-    return ""
 
 
 def test_a_scene_whose_map_does_not_fit_is_refused_before_it_flies(tmp_path):

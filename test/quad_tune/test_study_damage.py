@@ -36,140 +36,45 @@ def result(**fields):
     return f"UPDATE flights SET result = json_set(result, {pairs}) WHERE rowid = 2"
 
 
-def loosened(table, sql):
-    """Apply SQL to a table without its constraints."""
-
-    def apply(path):
-        damage(
-            path,
-            "PRAGMA writable_schema = ON; UPDATE sqlite_master SET"
-            f" sql = replace(sql, 'NOT NULL', '') WHERE name = '{table}'",
-        )
-        damage(path, sql)
-
-    return apply
-
-
 ROW = "UPDATE flights SET {} WHERE rowid = 2"
 IN_FLIGHTS = {
     "no JSON": ROW.format("result = 'x'"),
-    "cut JSON": ROW.format("result = substr(result, 1, 20)"),
-    "an empty result": ROW.format("result = ''"),
-    "a list": ROW.format("result = '[1, 2]'"),
     "a deep list": ROW.format(f"result = '{'[' * 40000}'"),
-    "a long text": ROW.format("result = printf('%.*c', 200000, '[')"),
     "a blob": ROW.format("result = x'ff00'"),
-    "no UTF-8": ROW.format("result = cast(x'ff22ff' as text)"),
     "a number as result": ROW.format("result = 5"),
-    "no mission": ROW.format("mission = NULL"),
-    "a blob as mission": ROW.format("mission = x'00'"),
-    "a number of parameters": ROW.format("parameters = x'01'"),
-    "no seed": ROW.format("seed = NULL"),
-    "a seed of text": ROW.format("seed = 'abc'"),
-    "a seed with a fraction": ROW.format("seed = 0.5"),
     "a field too few": "UPDATE flights SET result = json_remove(result, '$.goals') WHERE rowid = 2",
     "a field too many": result(extra=1),
-    "a null": result(goals="NULL"),
     "a text as time": result(time_s="'long'"),
-    "a text as number of goals": result(goals="'2'"),
-    "a fraction of a goal": result(goals=1.5),
-    "a negative number": result(contacts=-1),
     "more reached than goals": result(reached=7),
-    "an infinite time": ROW.format(f"result = '{RESULT.replace('40.0', 'Infinity')}'"),
     "a NaN": ROW.format(f"result = '{RESULT.replace('40.0', 'NaN')}'"),
-    "a huge time": result(time_s=1e300),
-    "a whole number beyond any float": ROW.format(
-        f"result = '{RESULT.replace('40.0', '9' * 400)}'"
-    ),
-    "digits without end": ROW.format(f"result = '{RESULT.replace('40.0', '9' * 9000)}'"),
-    "a list as gap": ROW.format(f"result = '{RESULT[:-1]}, \"clearance_m\": [1]}}'"),
     "a column too few": "ALTER TABLE flights RENAME COLUMN result TO results",
-    "a column that must be set": "ALTER TABLE flights ADD COLUMN x NOT NULL DEFAULT 1;"
-    " CREATE TABLE f (parameters, mission, seed, result, x NOT NULL);"
-    " INSERT INTO f SELECT * FROM flights; DROP TABLE flights; ALTER TABLE f RENAME TO flights",
-    "a trigger": "CREATE TRIGGER t AFTER INSERT ON flights BEGIN DELETE FROM flights; END",
-    "a view in place of the table": "ALTER TABLE flights RENAME TO f;"
-    " CREATE VIEW flights AS SELECT * FROM f",
-    "an endless view": "DROP TABLE flights; CREATE VIEW flights AS WITH RECURSIVE n(x) AS"
-    " (SELECT 1 UNION ALL SELECT x + 1 FROM n) SELECT x AS parameters, x AS mission, x AS seed,"
-    " x AS result FROM n",
 }
 IN_TRIALS = {
     "no study": "DELETE FROM studies",
-    "a study of another name": "UPDATE studies SET study_name = 'other'",
-    "no directions": "DELETE FROM study_directions",
-    "a direction that is none": "UPDATE study_directions SET direction = 'UP'",
     "the highest cost": "UPDATE study_directions SET direction = 'MAXIMIZE'",
-    "two goals": "INSERT INTO study_directions (direction, study_id, objective)"
-    " VALUES ('MINIMIZE', 1, 1)",
-    "no table of trials": "DROP TABLE trials",
-    "no table of studies": "DROP TABLE studies",
     "no table of values": "DROP TABLE trial_values",
-    "no table of parameters": "DROP TABLE trial_params",
-    "no tables but flights": "; ".join(
-        f"DROP TABLE {name}"
-        for name in (
-            "trial_values",
-            "trial_params",
-            "trial_user_attributes",
-            "trial_intermediate_values",
-            "trials",
-            "study_directions",
-            "study_user_attributes",
-            "studies",
-        )
-    ),
-    "an unknown state": "UPDATE trials SET state = 'BOGUS'",
     "a trial that still runs": "UPDATE trials SET state = 'RUNNING' WHERE number = 3",
-    "a trial that failed": "UPDATE trials SET state = 'FAIL' WHERE number = 3",
-    "no state": loosened("trials", "UPDATE trials SET state = NULL WHERE number = 3"),
-    "a number twice": "UPDATE trials SET number = 2 WHERE number = 3",
-    "a number of text": "UPDATE trials SET number = 'x' WHERE number = 3",
     "a trial left out": "DELETE FROM trials WHERE number = 3",
-    "a time that is none": "UPDATE trials SET datetime_start = 'yesterday' WHERE number = 3",
-    "a cost of text": "UPDATE trial_values SET value = 'low' WHERE trial_id = 3",
+    "a number twice": "UPDATE trials SET number = 2 WHERE number = 3",
     "no cost": "UPDATE trial_values SET value = NULL WHERE trial_id = 3",
     "an infinite cost": "UPDATE trial_values SET value_type = 'INF_POS' WHERE trial_id = 3",
-    "a type of cost that is none": "UPDATE trial_values SET value_type = 'X' WHERE trial_id = 3",
-    "no costs": "DELETE FROM trial_values",
     "no costs of rounds": "DELETE FROM trial_intermediate_values",
-    "a round that is none": "UPDATE trial_intermediate_values SET step = 'x' WHERE step = 4",
-    "a parameter of text": "UPDATE trial_params SET param_value = 'x' WHERE trial_id = 3",
-    "another parameter": "UPDATE trial_params SET param_name = 'other' WHERE param_name = 'speed'",
     "a parameter outside of its range": "UPDATE trial_params SET param_value = 7.0",
-    "another range": "UPDATE trial_params SET distribution_json ="
-    " replace(distribution_json, '1.0', '9.0')",
-    "a range that is none": "UPDATE trial_params SET distribution_json = '{}'",
-    "a distribution that is none": "UPDATE trial_params SET distribution_json = 'x'",
+    "another parameter": "UPDATE trial_params SET param_name = 'other' WHERE param_name = 'speed'",
     "statistics that are none": "UPDATE trial_user_attributes SET value_json = '{}'",
-    "statistics without JSON": "UPDATE trial_user_attributes SET value_json = '{'",
-    "statistics of text": "UPDATE trial_user_attributes SET value_json ="
-    " json_set(value_json, '$.cost', 'x')",
-    "no statistics": "DELETE FROM trial_user_attributes",
     "no options": "DELETE FROM study_user_attributes",
-    "options that are none": "UPDATE study_user_attributes SET value_json = '['",
-    "other options": "UPDATE study_user_attributes SET value_json = '[1]'",
     "another version": "UPDATE alembic_version SET version_num = 'x'",
-    "a round of no flight": "UPDATE trial_intermediate_values SET step = 0 WHERE step = 4",
-    "a trigger on trials": "CREATE TRIGGER t AFTER INSERT ON trials BEGIN DELETE FROM trials; END",
 }
 FILES = {
     "no database": lambda path: path.write_bytes(b"no database, but long enough" * 100),
     "a short text": lambda path: path.write_bytes(b"x"),
     "half of the file": lambda path: os.truncate(path, path.stat().st_size // 2),
-    "the header alone": lambda path: os.truncate(path, 100),
-    "a page of zeros": lambda path: overwrite(path, 8192, bytes(4096)),
     "a page of rubbish": lambda path: overwrite(path, 8192, b"\xa5" * 4096),
-    "another page size": lambda path: overwrite(path, 16, b"\x02\x00"),
-    "a schema of rubbish": lambda path: overwrite(path, 100, b"\xff" * 200),
     "a folder": lambda path: (path.unlink(), path.mkdir()),
     "a pipe": lambda path: (path.unlink(), os.mkfifo(path)),
 }
 HARMLESS = {
-    "another table": "CREATE TABLE mine (x)",
     "another column": "ALTER TABLE flights ADD COLUMN remark TEXT",
-    "a version of Optuna": "UPDATE version_info SET schema_version = 99",
-    "an index": "CREATE INDEX i ON flights (seed)",
     "older results": "UPDATE flights SET result = json_remove(result, '$.recoveries', '$.reason')",
     "a row of another study": f"INSERT INTO flights VALUES ('{{}}', 'other', 0, '{RESULT}')",
 }
@@ -227,7 +132,7 @@ def test_tune_refuses_a_damaged_study_before_it_flies(study, how):
     refused(open_and_close, study)
 
 
-@pytest.mark.parametrize("how", [*IN_FLIGHTS, *FILES])
+@pytest.mark.parametrize("how", ["no JSON", "a folder", "half of the file"])
 def test_sweep_refuses_a_damaged_cache_before_it_flies(study, how):
     damage(study, {**IN_FLIGHTS, **FILES}[how])
     mission = write_mission(study.parent)

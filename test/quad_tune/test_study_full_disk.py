@@ -55,7 +55,7 @@ def new_study(folder):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("free_pages", [0, 1, 3, 8])
+@pytest.mark.parametrize("free_pages", [0, 3])
 def test_a_study_stops_with_its_best_on_a_full_disk_and_resumes(tmp_path, monkeypatch, free_pages):
     setup, path = new_study(tmp_path)
     with monkeypatch.context() as patch:

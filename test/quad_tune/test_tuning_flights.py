@@ -15,7 +15,6 @@ import pytest
 from click.testing import CliRunner
 from study_flights import (
     FAST,
-    FLOWN,
     SPACE,
     mission_options,
     mortal_tasks,
@@ -36,8 +35,7 @@ from quad_tune.cli.sweep import sweep
 from quad_tune.cli.tune import tune
 from quad_tune.courses import HELD_OUT_SEED, Case, Mission, MissionCourse, check_missions
 from quad_tune.evaluation import task_of
-from quad_tune.flight_result import FlightTask, fly_task
-from quad_tune.report.outcome_pictures import front
+from quad_tune.flight_result import fly_task
 from quad_tune.sweep import read_points
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -142,18 +140,8 @@ def test_barn_is_searched_outside_of_the_official_sample(tmp_path):
     course = BarnCourse(BarnOptions(barn_worlds(tmp_path)))
     searched_worlds = [case.name for case in course.search_cases(10)]
     held_out = [case.name for case in course.held_out_cases(3)]
-    assert sorted(int(name.split()[-1]) for name in searched_worlds) == [
-        1,
-        2,
-        3,
-        4,
-        5,
-        7,
-        8,
-        9,
-        10,
-        11,
-    ]
+    numbers = sorted(int(name.split()[-1]) for name in searched_worlds)
+    assert numbers == [1, 2, 3, 4, 5, 7, 8, 9, 10, 11]
     assert held_out == ["BARN world 0", "BARN world 6", "BARN world 0"]
     assert {int(name.split()[-1]) > 5 for name in searched_worlds[:2]} == {True, False}
     assert {case.seed for case in course.held_out_cases(3)} == {HELD_OUT_SEED, HELD_OUT_SEED + 1}
@@ -176,48 +164,19 @@ def test_a_flight_through_barn_counts_as_the_benchmark_counts_it(tmp_path):
     assert touched["metric"] == late["metric"] == 0.0
 
 
-def test_the_front_holds_what_nothing_beats_in_both():
-    assert front([(3.0, 0.3), (1.0, 0.1), (2.0, 0.05), (4.0, 0.3), (2.5, 0.2), (1.0, 0.05)]) == [
-        (1.0, 0.1),
-        (2.5, 0.2),
-        (3.0, 0.3),
-    ]
-    assert front([]) == []
+def files_of(folder):
+    """Options with the files of a short mission."""
+    mission = write_mission(folder)
+    return [*("--scene", str(mission.scene), "--goals", str(mission.goals)), *SETS]
 
 
 def tune_arguments(folder):
     """A study of two candidates that flies in a few seconds."""
-    mission = write_mission(folder)
-    space = folder / "space.yaml"
-    space.write_text(SPACE)
-    return [
-        "--scene",
-        str(mission.scene),
-        "--goals",
-        str(mission.goals),
-        "--space",
-        str(space),
-        *SETS,
-        "--free-speed",
-        "--candidates",
-        "2",
-        "--flights",
-        "2",
-        "--finalists",
-        "1",
-        "--final-flights",
-        "2",
-        "--held-out",
-        "1",
-        "--against",
-        "tutorial",
-        "--workers",
-        "1",
-        "--output",
-        str(folder / "out"),
-        "--pictures",
-        str(folder / "pictures"),
-    ]
+    (folder / "space.yaml").write_text(SPACE)
+    sizes = "--candidates 2 --flights 2 --finalists 1 --final-flights 2 --held-out 1 --workers 1"
+    outputs = ["--output", str(folder / "out"), "--pictures", str(folder / "pictures")]
+    more = ["--space", str(folder / "space.yaml"), "--free-speed", "--against", "tutorial"]
+    return [*files_of(folder), *sizes.split(), *more, *outputs]
 
 
 def test_tune_from_the_command_line_and_again(tmp_path):
@@ -232,8 +191,8 @@ def test_tune_from_the_command_line_and_again(tmp_path):
     assert written["TrajectoryPlannerROS"]["vtheta_samples"] == 8  # the value of --set
     assert "quad" in (tmp_path / "out" / "config" / "STUDY.md").read_text()
     page = (tmp_path / "out" / "report.html").read_text()
-    assert page.count("data:image/png;base64,") >= 5
-    for name in ("held_out", "history", "pareto"):
+    assert page.count("data:image/png;base64,") >= 4
+    for name in ("held_out", "history", "pareto", "slices"):
         assert f'id="figure-plot-{name}"' in page
         assert (tmp_path / "pictures" / f"{name}.svg").exists()
     assert "Not distinguishable from chance with 1 flight" in page or "Base kept" in page
@@ -272,40 +231,13 @@ def test_tune_refuses_what_it_cannot_use(arguments, words, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def sweep_arguments(folder):
-    mission = write_mission(folder)
-    return [
-        "--scene",
-        str(mission.scene),
-        "--goals",
-        str(mission.goals),
-        *SETS,
-        "--flights",
-        "1",
-        "--workers",
-        "1",
-        "--cache",
-        str(folder / "flights.db"),
-        "--csv",
-        str(folder / "s.csv"),
-        "--json",
-        str(folder / "s.json"),
-        "--report",
-        str(folder / "s.html"),
-        "--pictures",
-        str(folder / "png"),
-    ]
-
-
 def test_sweep_from_the_command_line(tmp_path):
-    arguments = sweep_arguments(tmp_path)
-    over = [
-        "--over",
-        "TrajectoryPlannerROS/max_vel_x=0.4,0.8",
-        "--over",
-        "*_costmap/inflation_radius=0.4,0.6",
-    ]
-    done = CliRunner().invoke(sweep, [*over, *arguments])
+    names = {"cache": "f.db", "csv": "s.csv", "json": "s.json", "report": "s.html"}
+    outputs = [word for name in names for word in (f"--{name}", str(tmp_path / names[name]))]
+    outputs += ["--pictures", str(tmp_path / "png"), "--flights", "1", "--workers", "1"]
+    speeds = ["--over", "TrajectoryPlannerROS/max_vel_x=0.4,0.8"]
+    radii = ["--over", "*_costmap/inflation_radius=0.4,0.6"]
+    done = CliRunner().invoke(sweep, [*speeds, *radii, *files_of(tmp_path), *outputs])
     assert done.exit_code == 0, done.output
     with (tmp_path / "s.csv").open() as file:
         rows = list(csv.DictReader(file))
@@ -357,16 +289,3 @@ def test_flying_does_not_wait_for_optuna():
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     assert subprocess.run([sys.executable, "-c", code], env=environment).returncode == 0
-
-
-def test_a_task_on_paper_is_refused_with_its_reason():
-    assert fly_task(FlightTask(None, refused="why")) == replace(
-        FLOWN,
-        goals=1,
-        reached=0,
-        time_s=0.0,
-        straight_m=1.0,
-        clearance_m=None,
-        roughness_mps2=0.0,
-        reason="why",
-    )

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-import signal
-import subprocess
-import sys
 from pathlib import Path
+from signal import SIGKILL
 from typing import Optional
 
 import optuna
@@ -27,26 +25,29 @@ from quad_tune.flight_cache import FlightCache
 from quad_tune.flight_result import FlightResult
 from quad_tune.proposals import propose, should_prune
 from quad_tune.refinement import refine
-from quad_tune.report.search_pictures import importances
-from quad_tune.search import SearchOptions, best_first, rounds, search
+from quad_tune.report.tune_plots import importances
+from quad_tune.search import SearchOptions, rounds, search
 from quad_tune.study import json_differences, open_study
 from quad_tune.study_text import gain_text
 
-HERE = Path(__file__).resolve().parent
 OPTIONS = SearchOptions(candidates=32, flights=4, generation=8, seed=3)
 IDENTITY = {"course": "synthetic"}
 
 
-class StopsAfter(StudyObserver):
-    """Ctrl-C after so many flights."""
+def interrupt():
+    raise KeyboardInterrupt
 
-    def __init__(self, flights: int):
-        self._left = flights
+
+class StopsAfter(StudyObserver):
+    """Ends, as by Ctrl-C, after so many flights."""
+
+    def __init__(self, flights: int, stop=interrupt):
+        self._left, self._stop = flights, stop
 
     def on_flight(self, flight: FlightResult, cached: bool) -> None:
         self._left -= not cached
         if self._left == 0:
-            raise KeyboardInterrupt
+            self._stop()
 
 
 def run(folder: Path, options: SearchOptions = OPTIONS, observer: Optional[StudyObserver] = None):
@@ -111,27 +112,13 @@ def test_a_search_can_be_made_longer(tmp_path):
 @pytest.mark.slow
 def test_kill_9_loses_nothing(tmp_path):
     whole, all_flown = run(tmp_path / "whole")
-    code = """
-import os, signal, sys
-from pathlib import Path
-from typing import Optional
-import test_tuning_search as t
-class Dies(t.StudyObserver):
-    left = 23
-    def on_flight(self, flight, cached):
-        self.left -= 1
-        if self.left == 0:
-            os.kill(os.getpid(), signal.SIGKILL)
-t.run(Path(sys.argv[1]), observer=Dies())
-"""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(HERE)])}
-    died = subprocess.run([sys.executable, "-c", code, str(tmp_path / "parts")], env=environment)
-    assert died.returncode == -signal.SIGKILL
-    before = FlightCache(tmp_path / "parts" / "study.db").known_at_start
+    child = os.fork()
+    if child == 0:
+        run(tmp_path / "parts", observer=StopsAfter(23, lambda: os.kill(os.getpid(), SIGKILL)))
+    assert os.WTERMSIG(os.waitpid(child, 0)[1]) == SIGKILL
+    assert FlightCache(tmp_path / "parts" / "study.db").known_at_start == 23
     resumed, after = run(tmp_path / "parts")
-    assert before == 23
-    assert resumed == whole
-    assert before + len(after) == len(all_flown)
+    assert resumed == whole and 23 + len(after) == len(all_flown)
 
 
 def test_a_folder_keeps_to_its_study(tmp_path):
@@ -200,15 +187,6 @@ def test_nothing_is_changed_when_nothing_beats_the_base():
         course.search_cases(2),
     )
     assert refined.values == {} and refined.gains == ()
-
-
-def test_the_best_are_those_that_flew_everything():
-    trials = [
-        optuna.create_trial(value=2.0),
-        optuna.create_trial(value=1.0),
-        optuna.create_trial(state=TrialState.PRUNED, value=0.0, intermediate_values={1: 0.0}),
-    ]
-    assert [trial.value for trial in best_first(trials)] == [1.0, 2.0]
 
 
 def test_a_flight_is_known_by_parameters_mission_and_seed(tmp_path):

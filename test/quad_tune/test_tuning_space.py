@@ -67,17 +67,11 @@ g: {range: [0, 1], follow: {global_costmap/h: 1}}
     ]
 
 
-@pytest.mark.parametrize(
-    "value, expected",
-    [(0.123456, 0.123), (123.456, 123.0), (0.00098765, 0.000988), (-2.34567, -2.35), (0.0, 0.0)],
-)
-def test_values_have_three_digits(value, expected):
-    assert Dimension("a", -200.0, 200.0).rounded(value) == expected
-
-
-def test_rounded_values_stay_in_the_range():
-    assert Dimension("a", 0.1234, 0.5678).rounded(0.56775) == 0.5678
-    assert Dimension("a", 0.1234, 0.5678).rounded(0.12341) == 0.1234
+def test_values_have_three_digits_within_the_range():
+    wide, narrow = Dimension("a", -200.0, 200.0), Dimension("a", 0.1234, 0.5678)
+    values = [0.123456, 123.456, 0.00098765, -2.34567, 0.0]
+    assert [wide.rounded(value) for value in values] == [0.123, 123.0, 0.000988, -2.35, 0.0]
+    assert (narrow.rounded(0.56775), narrow.rounded(0.12341)) == (0.5678, 0.1234)
     assert Dimension("a", 3, 20, integer=True).rounded(7.6) == 8
     assert Dimension("a", choices=(5.0, 10.0)).nearest(7.0) == 5.0
 
@@ -108,22 +102,18 @@ def test_what_is_fixed_is_neither_searched_nor_followed():
 
 
 @pytest.mark.parametrize(
-    "base, name",
-    [("default", "default"), ("tutorial", "default"), ("barn", "default"), ("barn", "barn")],
+    "base, name", [("default", "default"), ("tutorial", "default"), ("barn", "barn"), ("", "dwa")]
 )
-def test_every_parameter_of_the_shipped_spaces_counts(base, name):
+def test_every_parameter_of_the_shipped_spaces_counts(tmp_path, base, name):
+    folder = ROOT / "config" / base
+    if not base:
+        folder = tmp_path / "dwa"
+        shutil.copytree(ROOT / "config" / "default", folder)
+        with (folder / "move_base_params.yaml").open("a") as file:
+            file.write("base_local_planner: dwa_local_planner/DWAPlannerROS\n")
     space = load_space(ROOT / "spaces" / f"{name}.yaml")
     for values in space.corners():
-        assert parameter_faults(space.assignments(values), ROOT / "config" / base, "s") == []
-
-
-def test_every_parameter_of_the_space_for_dwa_counts(tmp_path):
-    shutil.copytree(ROOT / "config" / "default", tmp_path / "dwa")
-    with (tmp_path / "dwa" / "move_base_params.yaml").open("a") as file:
-        file.write("base_local_planner: dwa_local_planner/DWAPlannerROS\n")
-    space = load_space(ROOT / "spaces" / "dwa.yaml")
-    for values in space.corners():
-        assert parameter_faults(space.assignments(values), tmp_path / "dwa", "s") == []
+        assert parameter_faults(space.assignments(values), folder, "s") == []
 
 
 def test_parameters_that_do_not_count_are_refused():

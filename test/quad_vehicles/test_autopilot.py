@@ -15,7 +15,6 @@ from quad_vehicles.autopilots import ARDUPILOT
 from quad_vehicles.setpoints import PERIOD_S
 
 ROOM = Scene("room", 60.0, 60.0, 1.0, Walls(), (), (Pose2D(30.0, 30.0, 0.0),))
-NARROW = Scene("narrow", 60.0, 60.0, 1.0, Walls(), (), (Pose2D(59.0, 30.0, 0.0),))
 
 
 def simulation(scene=ROOM, timeout_s=60.0, repeat_s=0.05, turn_lead_s=0.0):
@@ -109,23 +108,6 @@ def test_stream_while_turning_lags_behind_the_heading(repeat_s, sent, turn_lead_
 def test_the_bridge_in_the_airframe_is_that_of_real_vehicles():
     response = AIRFRAMES["arducopter"].response
     assert (response.repeat_s, response.turn_lead_s) == (PERIOD_S, ARDUPILOT.turn_lead_s)
-
-
-def test_hovers_when_commands_time_out():
-    flown = simulation(timeout_s=0.5)
-    flown.set_command(0, Twist2D(0.5, 0.0, 0.5))
-    rows = velocities(flown, 5.0)
-
-    assert np.abs(rows[-1, [0, 1, 5]]).max() < 0.01
-
-
-def test_touches_a_wall_like_any_body():
-    flown = simulation(NARROW)
-    flown.set_command(0, Twist2D(1.0, 0.0, 0.0))
-    contacts = flown.advance(3 * STEPS_PER_S)
-    flown.close()
-
-    assert [contact.robot for contact in contacts][:1] == ["quad0"]
 
 
 def test_flights_are_reproducible_and_reset_forgets_setpoints():

@@ -101,19 +101,12 @@ def two(first, second):
     "second, fault",
     [
         (
-            {"start": [1.5, 1.5, 2.0]},
-            "start: 0.00 m from vehicles[0].start, expected 0.2 m or more",
-        ),
-        (
             {"start": [1.6, 1.5, 0.0]},
             "start: 0.10 m from vehicles[0].start, expected 0.2 m or more",
         ),
         ({"start": [50.0, 1.5, 0.0]}, "start: (50, 1.5) is not in the room"),
         ({"altitude": 0.01}, "altitude: 0.01, expected 0.2 m or more"),
         ({"limits": {"speed": 50}}, "limits.speed: 50, expected 5 or less"),
-        ({"limits": {"climb": 50}}, "limits.climb: 50, expected 2.5 or less"),
-        ({"limits": {"yaw_rate": 50}}, "limits.yaw_rate: 50, expected 3.5 or less"),
-        ({"limits": {"height": 1e4}}, "limits.height: 10000, expected 120 or less"),
         ({"limits": {"radius": 1e5}}, "limits.radius: 100000, expected 500 or less"),
         (
             {"address": "udpin:127.0.0.1:99999"},
@@ -161,18 +154,13 @@ def test_each_bridge_has_a_system_number_of_its_own():
     "address, other, is_shared",
     [
         ("udpin:127.0.0.1:14550", "udpin:0.0.0.0:14550", True),
-        ("udp:0.0.0.0:14550", "udpin:192.168.1.5:14550", True),
         ("0.0.0.0:14550", "udpin:127.0.0.1:14550", True),
         ("udpin:localhost:14550", "udpin:127.0.0.1:14550", True),
-        ("udpin:127.0.0.1:14550", "udpin:127.0.0.1:014550", True),
         ("udpin:127.0.0.1:14550", "udpin:192.168.1.5:14550", False),
-        ("udpin:0.0.0.0:14550", "udpin:0.0.0.0:14551", False),
         ("udpout:192.168.1.5:14550", "udpout:192.168.1.6:14550", False),
         ("tcpin:0.0.0.0:5760", "udpin:0.0.0.0:5760", False),
         ("/dev/ttyUSB0,57600", "/dev/ttyUSB0,115200", True),
-        ("/dev/ttyUSB0,57600", "/dev/ttyUSB1,57600", False),
         ("radio://0/80/2M/E7E7E7E7E7", "radio://0/90/2M/E7E7E7E7E8", True),
-        ("radio://0/80/2M/E7E7E7E7E7", "radio://1/80/2M/E7E7E7E7E7", False),
         ("tcp://127.0.0.1:14661", "tcp://127.0.0.1:14662", False),
     ],
 )

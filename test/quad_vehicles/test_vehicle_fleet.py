@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import threading
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+import yaml
 
 rospy = pytest.importorskip("rospy")
 
@@ -14,12 +16,15 @@ from ros.own_messages import event_message, state_message  # noqa: E402
 from std_msgs.msg import Empty  # noqa: E402
 from std_srvs.srv import TriggerRequest, TriggerResponse  # noqa: E402
 
+from quad_nav.errors import InputError  # noqa: E402
 from quad_nav.geometry import Pose2D  # noqa: E402
 from quad_nav.mission.actions import Event  # noqa: E402
 from quad_nav.topics.mission_events import EVENTS_TOPIC  # noqa: E402
 from quad_vehicles.ros import fleet  # noqa: E402
 from quad_vehicles.ros.node import LAND_ALL_TOPIC  # noqa: E402
 from quad_vehicles.vehicle_file import Vehicle  # noqa: E402
+
+ARENA = Path(__file__).resolve().parents[2] / "scenes" / "arena.yaml"
 
 
 class Fleet:
@@ -127,13 +132,6 @@ def test_a_pilot_who_takes_over_in_the_climb_lands_nobody(flown):
     assert flown.landings == 0
 
 
-def test_no_take_off_of_taken_over_vehicles_alone(flown):
-    flown.tell(vehicle0="taken over", vehicle1="taken over")
-    response = flown.take_off()
-    assert not response.success and "quad0: taken over" in response.message
-    assert (flown.calls, flown.landings) == ([], 0)
-
-
 def test_a_vehicle_that_does_not_get_ready_leaves_the_others_as_they_are(flown):
     flown.tell(vehicle0="flying", vehicle1="not ready")
     response = flown.take_off()
@@ -235,13 +233,6 @@ def test_the_others_land_when_the_rest_is_taken_over(flown):
     assert flown.landings == 1
 
 
-def test_the_others_land_when_the_last_one_is_taken_over(flown):
-    flown.tell(vehicle0="flying", vehicle1="flying")
-    flown.say(0, Event.DONE)
-    flown.tell(vehicle1="taken over")
-    assert flown.landings == 1
-
-
 @pytest.mark.parametrize("is_stopped", [False, True])
 def test_a_vehicle_on_the_ground_is_waited_for_unless_its_mission_is_stopped(flown, is_stopped):
     flown.ros._parameters["/mission/quad1/stopped"] = is_stopped
@@ -267,3 +258,74 @@ def test_a_vehicle_that_flies_again_lands_after_its_own_last_goal(ros, monkeypat
     assert flown.landings == 1
     flown.say(1, Event.DONE)
     assert flown.landings == 2
+
+
+# Bridges that have died.
+
+
+def test_a_vehicle_whose_bridge_has_died_in_flight_is_not_reported_as_flying(flown):
+    flown.tell(vehicle0="flying", vehicle1="landed")
+    flown.now_s += 3.1
+    flown.states.pop("vehicle0")  # it says nothing any more
+    flown.tell(vehicle1="landed")
+    start_s = flown.now_s
+    told = FakeService.all["/vehicles/land"].handler(TriggerRequest())
+    silent = "quad0 (its bridge is silent, last state: flying: as the test says)"
+    assert (told.success, told.message) == (False, f"still in the air: {silent}")
+    assert flown.now_s == start_s  # there is nothing to wait for
+
+
+def test_landing_waits_for_those_whose_bridges_live(flown):
+    flown.tell(vehicle0="flying", vehicle1="landing")
+    flown.states.pop("vehicle0")
+    flown.script[4.0] = lambda: flown.tell(vehicle1="landed")
+    told = FakeService.all["/vehicles/land"].handler(TriggerRequest())
+    assert not told.success and "quad0 (its bridge is silent" in told.message
+    assert flown.now_s == pytest.approx(4.0, abs=0.2)
+
+
+def test_take_off_names_bridges_that_are_silent_or_missing(flown):
+    flown.tell(vehicle0="ready")
+    flown.states.pop("vehicle0")
+    silent = "quad0: its bridge is silent, last state: ready: as the test says"
+    assert flown.take_off().message == f"{silent}; quad1: no bridge"
+
+
+# Files that do not fit the scene.
+
+
+def vehicles_file(tmp_path, *vehicles):
+    path = tmp_path / "vehicles.yaml"
+    numbered = [{"number": k, **one} for k, one in enumerate(vehicles)]
+    path.write_text(yaml.safe_dump({"vehicles": numbered}))
+    return path
+
+
+REAL = {"kind": "mavlink", "address": "udpin:127.0.0.1:14551"}
+
+
+@pytest.mark.parametrize(
+    "vehicles, fault",
+    [
+        (
+            [{**REAL, "start": [50.0, 1.5, 0.0]}],
+            "vehicles[0].start: (50, 1.5) is outside the arena, expected 0 < x <",
+        ),
+        (  # the scene's second start pose
+            [{**REAL, "start": [10.0, 2.0, 0.0]}, {"kind": "simulated"}],
+            "quad1: starts less than 0.6 m from quad0, expected a place of its own",
+        ),
+    ],
+)
+def test_a_start_that_does_not_fit_the_scene_is_a_fault(tmp_path, vehicles, fault):
+    path = vehicles_file(tmp_path, *vehicles)
+    with pytest.raises(InputError) as error:
+        fleet.read_setup({"vehicles": str(path), "scene": str(ARENA)}, "vehicles")
+    (found,) = error.value.problems
+    assert found.startswith(f"{path}: {fault}") or found == fault
+
+
+def test_starts_in_the_scene_are_good(tmp_path):
+    path = vehicles_file(tmp_path, {**REAL, "start": [1.5, 1.5, 0.0]}, {"kind": "simulated"})
+    _, vehicles, scene = fleet.read_setup({"vehicles": str(path), "scene": str(ARENA)}, "vehicles")
+    assert len(vehicles) == 2 and scene.contains(1.5, 1.5)

@@ -55,44 +55,33 @@ def test_only_heartbeats_of_the_vehicles_autopilot_count(server):
     vehicle.close()
 
 
+def accepted(server):
+    """The connection that a link has opened, None if it has not yet."""
+    server.setblocking(False)
+    try:
+        return server.accept()[0]
+    except BlockingIOError:
+        return None
+
+
 def test_it_connects_again_after_the_other_side_has_closed(server):
-    link = link_to(f"tcp:127.0.0.1:{server.getsockname()[1]}")
+    link, made = link_to(f"tcp:127.0.0.1:{server.getsockname()[1]}"), []
     inputs = link.machine.inputs
     for mode, name in [(4, "GUIDED"), (9, "LAND")]:
-        accepted = []
-        server.setblocking(False)
-
-        def is_accepted(accepted=accepted):
-            try:
-                accepted.append(server.accept()[0])
-            except BlockingIOError:
-                return False
-            return True
-
-        read_until(link, is_accepted)
-        accepted[0].sendall(heartbeat(mode))
+        read_until(link, lambda: made.append(accepted(server)) or made[-1])
+        made[-1].sendall(heartbeat(mode))
         read_until(link, lambda name=name: inputs.status is not None and inputs.status.mode == name)
-        accepted[0].close()
+        made[-1].close()
     link.close()
 
 
 def test_a_vehicle_that_is_not_there_yet_is_no_fault(server):
     port = server.getsockname()[1]
     server.close()
-    link = link_to(f"tcp:127.0.0.1:{port}")
+    link, made = link_to(f"tcp:127.0.0.1:{port}"), []
     with socket.create_server(("127.0.0.1", port)) as later:
-        later.setblocking(False)
-        accepted = []
-
-        def is_accepted():
-            try:
-                accepted.append(later.accept()[0])
-            except BlockingIOError:
-                return False
-            return True
-
-        read_until(link, is_accepted)
-        accepted[0].close()
+        read_until(link, lambda: made.append(accepted(later)) or made[-1])
+        made[-1].close()
     link.close()
 
 

@@ -97,20 +97,3 @@ def test_a_resumption_without_effect_fails_with_the_reason(bridge):
     assert resume() == (False, "taken over: no effect of the order to take control")
     assert flight.now_s - start_s < 6.0
     bridge.pause.resume.assert_not_called()
-
-
-def test_a_resumption_of_a_vehicle_that_is_disarmed_meanwhile_resumes_no_mission(bridge):
-    flight = taken_over(bridge)
-    flight.is_heard = False
-    tick, start_s = bridge.tick, flight.now_s
-
-    def tick_and_disarm():
-        if flight.now_s - start_s > 0.5 and flight.vehicle.armed:
-            flight.vehicle.kill_motors()
-            flight.vehicle.set_mode(flight.vehicle.kind["control"])
-        return tick()
-
-    bridge.tick = tick_and_disarm
-    assert not resume()[0]
-    assert not flight.vehicle.armed
-    bridge.pause.resume.assert_not_called()

@@ -12,8 +12,7 @@ from hand_made_recording import LAST_S, write_flight, x_at
 from quad_nav.cli import main
 from quad_nav.sim.scene import BODY_RADIUS_M
 from quad_web.replay import replay as replay_module
-from quad_web.replay.recorded_flight import RecordedFlight
-from quad_web.replay.replay import FASTEST, OpenedReplay, Replay
+from quad_web.replay.replay import FASTEST, Replay
 from quad_web.view.actions import Answer
 from quad_web.view.state import LAYERS, FleetState, Wanted
 
@@ -21,13 +20,6 @@ from quad_web.view.state import LAYERS, FleetState, Wanted
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
     return write_flight(tmp_path_factory.mktemp("replay") / "flight.bag")
-
-
-@pytest.fixture
-def flight(path):
-    flight = RecordedFlight(path)
-    yield flight
-    flight.close()
 
 
 class Clock:
@@ -40,9 +32,11 @@ class Clock:
 
 
 @pytest.fixture
-def player(flight):
+def player(path):
     state, clock = FleetState(), Clock()
-    return Replay(flight, state, clock), state, clock
+    replay = Replay(path, state, clock)
+    replay.read()
+    return replay, state, clock
 
 
 def step(player, wall_s: float = 0.0):
@@ -140,23 +134,23 @@ def test_the_log_has_each_event_once(player):
 def test_while_the_file_is_read_the_page_says_how_far_it_is(path, monkeypatch):
     monkeypatch.setattr(replay_module, "_PROGRESS_PERIOD_S", 0.0)
     state, titles = FleetState(), []
-    replay = OpenedReplay(path, state)
+    replay = Replay(path, state)
     state.add_listener(lambda: titles.append(state.item("flight").data["title"]))
     assert state.item("flight").data["state"] == "starting"
-    assert replay.pause() == Answer(False, "pause: the recording is still being read")
-    player = replay.read()
+    assert replay.call("pause") == Answer(False, "pause: the recording is still being read")
+    assert replay.call("goal_files") == []
+    replay.read()
     shares = [int(title.split(", ")[1].rstrip("%")) for title in titles[:-1]]
     assert titles[0] == f"reading {path.name}, 0%" and titles[-1] == path.name
     assert len(shares) > 100 and shares == sorted(shares) and 95 < shares[-1] <= 100
-    assert replay.seek(1.0).ok and replay.pause().ok
-    player.step()
+    assert replay.call("seek", 1.0).ok and replay.call("pause").ok
+    replay.step()
     assert state.item("flight").data["state"] == "paused"
     assert state.item("flight").data["time_s"] == 1.0
 
 
 def test_a_replay_steers_nothing(player):
-    assert not player[0].stop_all().ok and not player[0].cancel(0).ok
-    assert "stop_all" not in player[0].available
+    assert not player[0].call("stop_all").ok and not player[0].call("cancel", 0).ok
 
 
 @pytest.mark.parametrize(

@@ -4,72 +4,38 @@ from __future__ import annotations
 
 import pytest
 
-from quad_nav.geometry import Pose2D
-from quad_web.view.actions import Actions, Answer, GoalFileView, ParameterView, WatchOnly
-
-PARAMETERS = [ParameterView("", "planner_frequency", "double", 1.0, 1.0)]
-FILES = [GoalFileView(0, "goals.json", "v1", [(1.0, 2.0, None)])]
-CALLS = {
-    "start": (),
-    "pause": (),
-    "reset": (),
-    "set_rate": (2.0,),
-    "seek": (1.0,),
-    "send_goal": (0, Pose2D(1.0, 2.0)),
-    "cancel": (0,),
-    "stop_all": (),
-    "clear_costmaps": (0,),
-    "enable_lidar": (0, True),
-    "set_parameters": (0, "", {"planner_frequency": 2.0}),
-    "save_goals": (0, "v1", []),
-}
-READS = {"parameters", "goal_files", "check_goals"}
+from quad_web.view.actions import LABELS, READS, Actions, Answer, WatchOnly
 
 
 class Everything(Actions):
     """Can do everything and counts what it did."""
 
-    available = frozenset(CALLS)
+    available = frozenset({*LABELS, *READS})
 
     def __init__(self):
         self.done = []
 
-    def __getattribute__(self, name):
-        if name in CALLS:
-            return lambda *args: self.done.append(name) or Answer(True, name)
-        return super().__getattribute__(name)
-
-    def parameters(self, robot):
-        return PARAMETERS
-
-    def goal_files(self):
-        return FILES
+    def __getattr__(self, name):
+        return lambda *arguments: self.done.append((name, *arguments)) or Answer(True, name)
 
 
-def test_every_action_is_listed_here():
-    methods = {
-        name for name in vars(Actions) if callable(getattr(Actions, name)) and name[0] != "_"
-    }
-    assert methods == set(CALLS) | READS
-
-
-@pytest.mark.parametrize("name", CALLS)
-def test_who_may_watch_only_is_refused_everything(name):
+@pytest.mark.parametrize("name", LABELS)
+def test_actions_are_carried_out_or_refused(name):
     steering = Everything()
     watching = WatchOnly(steering)
-    answer = getattr(watching, name)(*CALLS[name])
-    assert (answer.ok, answer.text) == (False, f"{name}: this page may only watch")
-    assert steering.done == []
-    assert watching.available == frozenset()
-    assert getattr(steering, name)(*CALLS[name]).ok
+    assert watching.call(name, 1) == Answer(False, f"{name}: this page may only watch")
+    assert watching.available == frozenset() and steering.done == []
+    assert steering.call(name, 1).ok and steering.done == [(name, 1)]
+    assert Actions().call(name, 1) == Answer(False, f"{name}: not possible here")
 
 
-def test_who_may_watch_only_sees_parameters_and_goals():
-    watching = WatchOnly(Everything())
-    assert (watching.parameters(0), watching.goal_files()) == (PARAMETERS, FILES)
+def test_who_may_watch_only_sees_parameters_and_goals_and_has_no_goals_checked():
+    steering = Everything()
+    watching = WatchOnly(steering)
+    assert watching.call("parameters", 0).ok and watching.call("goal_files").ok
+    assert watching.call("check_goals", 0, "v1", []) == [] == Actions().call("goal_files")
+    assert steering.done == [("parameters", 0), ("goal_files",)]
 
 
-@pytest.mark.parametrize("name", CALLS)
-def test_what_a_source_lacks_is_said(name):
-    answer = getattr(Actions(), name)(*CALLS[name])
-    assert (answer.ok, answer.text) == (False, f"{name}: not possible here")
+def test_nothing_else_is_called():
+    assert not Everything().call("__init__").ok and not Everything().call("refusal").ok

@@ -59,14 +59,6 @@ def test_message_is_laid_out_as_documented():
     assert message[4 + length :] == b"\x00\xff\x07\x09\x01\0\0\0" + b"\xfb\xff\xff\xff\0\0\0\0"
 
 
-@pytest.mark.parametrize("letters", range(9))
-def test_arrays_are_aligned_whatever_the_header(letters):
-    message = encode([Item("k" * (letters + 1), None, {"t": np.array([2.5])})])
-    (length,) = struct.unpack_from("<I", message)
-    assert (4 + length) % 8 == 0
-    assert struct.unpack_from("<d", message, 4 + length) == (2.5,)
-
-
 def test_large_costmaps_are_deflated():
     costs = np.zeros((400, 400), np.int8)
     costs[100:110] = 100
@@ -77,13 +69,6 @@ def test_large_costmaps_are_deflated():
     assert described == {"costs": True, "points": False}
     assert len(message) < 160_000 / 50 + points.nbytes
     np.testing.assert_array_equal(arrays["map"]["costs"], costs)
-
-
-def test_parts_of_arrays_are_copied_in_order():
-    grid = np.arange(12, dtype=np.int32).reshape(3, 4)
-    _, arrays = decode(encode([Item("a", None, {"part": grid[1:, ::2], "turned": grid.T})]))
-    assert arrays["a"]["part"].tolist() == [[4, 6], [8, 10]]
-    np.testing.assert_array_equal(arrays["a"]["turned"], grid.T)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])

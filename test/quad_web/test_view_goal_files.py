@@ -56,7 +56,7 @@ def test_goals_are_added_removed_and_put_in_another_order(files):
 def test_faults_are_those_of_files(files):
     version, (first, _) = unchanged(files)
     goals = [first, GoalChange(None, 11.0, 0.0, None), GoalChange(None, math.nan, 0.0, 7.0)]
-    good, outside, broken = files.check_goals(3, version, goals)
+    good, outside, broken = files.check_goals(3, goals)
     assert (good, outside) == ("", "is outside")
     assert "x is NaN; expected a finite number of metres; yaw is 7;" in broken
     for bad, message in ((goals[:2], "goals[1] (goal 2): (11, 0) is outside"), (goals, "x is NaN")):

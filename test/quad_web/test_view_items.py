@@ -31,7 +31,6 @@ from quad_web.view.items import (
     Trails,
     body_row,
     costmap_item,
-    hit_points,
     line_item,
     moving_solids,
     poses_item,
@@ -41,14 +40,12 @@ from quad_web.view.items import (
     track_item,
 )
 from quad_web.view.rows import (
+    RobotNow,
     contacts_item,
     flight_item,
     gaps_m,
     goal_rows,
-    robot_state,
     samples_item,
-    status_row,
-    yield_rows,
 )
 
 SCENE = Scene(
@@ -134,9 +131,8 @@ def test_obstacles_are_put_when_they_have_moved_and_people_look_where_they_walk(
 
 
 def test_robots_have_the_colours_of_all_displays():
-    robots = robots_item(["a", "b"], 0.3, [(0.1, 0.2), (0.0, -0.2)]).data
+    robots = robots_item(["a", "b"], 0.3).data
     assert robots["colours"] == ["#2078dc", "#e66e14"]  # (32, 120, 220), (230, 110, 20)
-    assert robots["footprint"] == [[0.1, 0.2], [0.0, -0.2]]
 
 
 def test_poses_have_tilt_and_velocity_in_map():
@@ -156,7 +152,6 @@ def test_beams_hit_where_they_look():
     scan = Scan(0.5, 0.0, math.pi / 2, 0.02, 60.0, np.array([3.0, np.inf, 0.5], dtype=np.float32))
     pose = Pose3D(1.0, 2.0, 1.06, quaternion_from_yaw(math.pi / 2))
     expected = pytest.approx(np.array([[1.0, 5.0, 1.06], [1.0, 1.5, 1.06]]))
-    assert hit_points(scan, pose) == expected
     item = scan_item(7, scan, pose)
     assert (item.key, item.data) == ("scan/7", {"stamp_s": 0.5})
     assert item.arrays["points"].dtype == np.float32
@@ -235,7 +230,7 @@ def contains(polygon, point):
 
 def test_unknown_robots_have_no_cell_and_bound_none():
     positions = [[1.0, 5.0], [math.nan, math.nan]]
-    (cell,) = cell_items(SCENE, positions, 0.5, [0, 1])
+    (cell,) = cell_items(SCENE, positions, {0: 0.5, 1: 0.5})
     assert cell.key == "cell/0"
     assert sorted(map(tuple, cell.arrays["points"].tolist())) == [(-1, 2), (-1, 8), (7, 2), (7, 8)]
 
@@ -252,12 +247,14 @@ def test_goals_before_the_active_one_have_ended():
 def test_yields_name_the_peer_and_the_place():
     names = ["a", "b", "c"]
     holds = YieldDecision("c", Yield.MAKE_ROOM, Pose2D(1.0, 2.0))
-    assert yield_rows(0, holds, "b", names) == [
+    assert RobotNow(yielding=holds, limited_by="b").yield_rows(0, names) == [
         {"robot": 0, "peer": 2, "kind": "makes room", "hold": [1.0, 2.0]},
         {"robot": 0, "peer": 1, "kind": "limited", "hold": None},
     ]
-    assert yield_rows(0, YieldDecision("b", Yield.WAIT), "", names)[0]["kind"] == "waits"
-    assert yield_rows(0, YieldDecision("stranger", Yield.WAIT), "other", names) == []
+    (waits,) = RobotNow(yielding=YieldDecision("b", Yield.WAIT)).yield_rows(0, names)
+    assert waits["kind"] == "waits"
+    stranger = RobotNow(yielding=YieldDecision("stranger", Yield.WAIT), limited_by="other")
+    assert stranger.yield_rows(0, names) == []
 
 
 def test_contacts_have_the_number_of_the_robot():
@@ -271,9 +268,10 @@ def test_contacts_have_the_number_of_the_robot():
 
 def test_gaps_are_between_hulls():
     """Robots at 0, 2 and 5 m: the nearest are 2, 2 and 3 m away, less two radii of 0.3 m."""
-    assert gaps_m([[0.0, 0.0], [2.0, 0.0], [5.0, 0.0]], 0.3) == pytest.approx([1.4, 1.4, 2.4])
-    assert np.isnan(gaps_m([[0.0, 0.0]], 0.3)).all()
-    unknown = gaps_m([[0.0, 0.0], [math.nan, math.nan], [4.0, 0.0]], 0.3)
+    positions = np.array([[0.0, 0.0], [2.0, 0.0], [5.0, 0.0]])
+    assert gaps_m(positions, 0.3) == pytest.approx([1.4, 1.4, 2.4])
+    assert np.isnan(gaps_m(positions[:1], 0.3)).all()
+    unknown = gaps_m(np.array([[0.0, 0.0], [math.nan, math.nan], [4.0, 0.0]]), 0.3)
     assert unknown == pytest.approx([3.4, math.nan, 3.4], nan_ok=True)
 
 
@@ -281,12 +279,12 @@ def test_samples_of_known_and_unknown_robots():
     """One robot 1 m from the western wall at 0.5 m/s, one that is unknown."""
     poses = np.full((2, 9), math.nan)
     poses[0] = [0.0, 7.0, 1.0, 0.0, 0.0, 0.0, 0.3, 0.4, 0.0]
-    item = samples_item(3.0, poses, [0.02, math.nan], 0.3, SCENE)
+    item = samples_item(3.0, poses, 0.3, SCENE, cycles_s=[0.02, math.nan])
     values = item.arrays["values"]
     assert values.dtype == np.float32
     assert values[0] == pytest.approx([math.nan, 0.7, 0.5, 0.02], nan_ok=True)
     assert np.isnan(values[1]).all()
-    assert np.isnan(samples_item(3.0, poses, [0.02, 0.0], 0.3, None).arrays["values"][0, 1])
+    assert np.isnan(samples_item(3.0, poses, 0.3, None).arrays["values"][0, 1])
 
 
 def test_clearance_is_also_that_to_moving_obstacles():
@@ -295,7 +293,7 @@ def test_clearance_is_also_that_to_moving_obstacles():
     poses[0, :2] = [2.0, 6.0]
     moving = moving_solids(STREET, [(math.nan, math.nan, math.nan), (2.0, 6.9, 0.0)])
     assert [solid.name for solid in moving] == ["person_0"]
-    item = samples_item(3.0, poses, [0.02], 0.3, STREET, moving)
+    item = samples_item(3.0, poses, 0.3, STREET, moving)
     assert item.arrays["values"][0, 1] == pytest.approx(0.35)
 
 
@@ -316,14 +314,15 @@ MAKES_ROOM = YieldDecision("b", Yield.MAKE_ROOM, Pose2D(0.0, 0.0))
         ("done", "idle", 0.0, {"is_done": True}),
         ("stopped", "controlling", 0.0, {"is_stopped": True}),
         ("lost", "controlling", 0.2, {"is_lost": True, "is_stopped": True}),
+        ("stopped", "controlling", 0.2, {"has_ended": True}),
     ],
 )
 def test_state_is_the_first_that_is_true(expected, navigator, speed_mps, facts):
-    assert robot_state(navigator, speed_mps, **facts) == expected
+    assert RobotNow(navigator, **facts).state(speed_mps) == expected
 
 
 def test_unknown_numbers_are_none():
-    row = status_row(2, "idle", speed_mps=0.5, recoveries=(1, 4))
+    row = RobotNow(recoveries=(1, 4)).status_row(2, 0.5, math.nan)
     assert row.get("goal_distance") is row["gap_m"] is row["goal"] is None
     assert (row["speed_mps"], row["recoveries"]) == (0.5, [1, 4])
     assert flight_item("ros", "room", "running", 1.0, rate=math.inf).data["rate"] is None

@@ -56,16 +56,8 @@ def test_the_mission_waits_at_its_start(hall):
     assert plan_end(state) == [7.0, 3.5]
     assert state.item("global_costmap/1").arrays["costs"].max() == 100
     assert [row["gap_m"] > 5.0 for row in state.item("status").data["rows"]] == [True, True]
-    for refused in (mission.start(), mission.stop_all(), mission.cancel(0)):
+    for refused in (mission.call("start"), mission.call("stop_all"), mission.call("cancel", 0)):
         assert not refused.ok and "the flight has not begun" in refused.text
-
-
-def test_obstacles_that_move_are_where_they_start(hall):
-    cart = "motion: {keyframes: [{time: 0.0, x: 1.0, y: 2.0}, {time: 8.0, x: 5.0, y: 2.0}]}"
-    cart = f"  - {{name: cart, shape: box, size: [1.0, 0.5], height: 2.0, {cart}}}\nstarts"
-    hall.scene.write_text(SCENE.replace("starts", cart))
-    _, state = begin(hall)
-    assert state.item("obstacles").arrays["poses"].tolist() == [[1.0, 2.0, 0.0]]
 
 
 def test_a_dragged_goal_is_checked_planned_and_saved(hall):

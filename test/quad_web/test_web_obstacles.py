@@ -22,8 +22,9 @@ from quad_nav.sim.obstacles import Box  # noqa: E402
 from quad_nav.sim.scene import MovingObstacle, Scene, Walls  # noqa: E402
 from quad_nav.topics.obstacle_poses import POSES_TOPIC  # noqa: E402
 from quad_nav.topics.tracked_obstacles import obstacle_fields  # noqa: E402
-from quad_web.ros.layers import TrackIntake  # noqa: E402
+from quad_web.ros.layers import Layers  # noqa: E402
 from quad_web.ros.obstacles import Obstacles  # noqa: E402
+from quad_web.view.state import LAYERS  # noqa: E402
 
 CART = MovingObstacle(
     Box("cart", 1.0, 6.0, 1.0, 0.5, 2.0), Motion((0.0, 10.0), ((1.0, 6.0, -3.0), (5.0, 6.0, -3.0)))
@@ -102,28 +103,23 @@ def message_of(tracks: Tracks, frame: str) -> msg.MovingObstacles:
 def test_tracks_are_shown_in_map_until_the_last_one_has_ended():
     """odom0 is at (2, 1) in map and turned by 90 degrees."""
     frames = FakeFrames()
-    tracked = TrackIntake(0, frames)
-    ((name, topic),) = tracked.topics().items()
-    assert name == "/move_base0/moving_obstacle_tracks" and tracked.item() is None
+    layers = Layers(None, frames, lambda robot: {})
+    shown_layers = {layer: {0} if layer == "track" else set() for layer in LAYERS}
+    ((name, topic),) = layers.topics(shown_layers).items()
+    assert name == "/move_base0/moving_obstacle_tracks" and layers.items() == []
     shown = message_of(TRACKS, "odom0")
     deliver(topic, shown)
-    assert tracked.item() is None  # the transform of odom0 is not known yet
+    assert layers.items() == []  # the transform of odom0 is not known yet
     frames.map_from_odom = Pose3D(2.0, 1.0, 0.0, quaternion_from_yaw(math.pi / 2))
     deliver(topic, shown)
-    item = tracked.item()
+    (item,) = layers.items()
     assert item.key == "track/0"
     (row,) = item.arrays["rows"].tolist()
     assert row == pytest.approx([2.0, 2.0, 0.0, 0.5, 0.3, 0.0])
-    assert tracked.item() is None
+    assert layers.items() == []
     deliver(topic, message_of(Tracks.none(4.0), "odom0"))
-    assert tracked.item().arrays["rows"].shape == (0, 6)
-
-
-def test_tracks_that_are_nowhere_are_refused():
-    tracked = TrackIntake(0, FakeFrames())
-    (topic,) = tracked.topics().values()
-    message = message_of(TRACKS, "map")
-    message.obstacles[0].radius = math.inf
-    deliver(topic, message)
-    with pytest.raises(ValueError, match="expected a disc"):
-        tracked.item()
+    (item,) = layers.items()
+    assert item.arrays["rows"].shape == (0, 6)
+    shown.obstacles[0].radius = math.inf
+    deliver(topic, shown)
+    assert layers.items() == []

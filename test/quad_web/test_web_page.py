@@ -8,27 +8,12 @@ import itertools
 import threading
 import weakref
 
-import pytest
 from page_without_browser import Recorded, fleet, with_page
 
 from quad_nav.geometry import Pose2D
-from quad_web.page_client import LABELS
 from quad_web.view.actions import Answer, GoalChange, GoalFileView, Role
 
 POSE = {"x": 3.0, "y": 4.0, "yaw": None}
-
-
-def test_every_control_calls_its_action():
-    async def scenario(person, actions):
-        person.page.client.select(1)
-        await person.settled()
-        for testid in ("play", "reset", "stop-all", "cancel", "clear-costmaps"):
-            assert person.fire(person.element(testid), "click", {}) == 1
-            await person.settled()
-        names = [("pause",), ("reset",), ("stop_all",), ("cancel", 1), ("clear_costmaps", 1)]
-        assert actions.calls == names
-
-    with_page(scenario)
 
 
 def test_a_page_that_may_only_watch_steers_with_no_event_of_any_element():
@@ -83,20 +68,6 @@ def test_what_the_source_cannot_do_is_disabled_with_the_reason():
         assert not person.element("scrub").visible or not person.page.bar._line.visible
 
     with_page(scenario, actions=Watched())
-
-
-def test_a_click_on_a_row_selects_and_the_arena_too():
-    async def scenario(person, actions):
-        page = person.page
-        person.fire(person.element("robots"), "pick", 1)
-        assert (page.client.selected, page.arena.selected) == (1, 1)
-        assert person.element("card-name").text == "quad1"
-        person.fire(page.arena, "select", 0)
-        assert person.element("card-name").text == "quad0"
-        person.fire(page.arena, "select", None)
-        assert person.element("card-name").text == "No robot selected"
-
-    with_page(scenario)
 
 
 def test_a_time_line_that_is_dragged_skips_to_the_last_time():
@@ -202,26 +173,6 @@ def test_an_edited_file_that_changes_on_the_disk_is_not_saved_and_can_be_loaded_
         assert editor.draft.goals == [{"source": 0, "x": 5.0, "y": 5.0, "yaw": 1.0}]
 
     with_page(scenario)
-
-
-@pytest.mark.parametrize("name", ["stop_all"])
-def test_the_key_of_the_button_stops(name):
-    async def scenario(person, actions):
-        (keyboard,) = (e for e in person.client.elements.values() if e.tag == "nicegui-keyboard")
-        key = {
-            **dict.fromkeys(("altKey", "ctrlKey", "shiftKey", "metaKey", "repeat"), False),
-            "action": "keydown",
-            "code": "Period",
-            "key": ".",
-            "location": 0,
-        }
-        person.fire(keyboard, "key", key)
-        person.fire(keyboard, "key", {**key, "key": ",", "code": "Comma"})
-        await person.settled()
-        assert actions.calls == [(name,)]
-
-    with_page(scenario)
-    assert name in LABELS
 
 
 def test_nothing_is_left_of_a_page_that_was_closed():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import re
 import threading
 from pathlib import Path
 
@@ -11,8 +10,8 @@ import pytest
 from page_without_browser import Recorded, fleet
 
 from quad_web import page_client
-from quad_web.page_client import LABELS, NOT_HERE, READS, WATCHES, PageClient
-from quad_web.view.actions import Actions, Answer, Role
+from quad_web.page_client import NOT_HERE, WATCHES, PageClient
+from quad_web.view.actions import LABELS, Answer, Role
 
 WEB = Path(page_client.__file__).parent
 
@@ -20,11 +19,6 @@ WEB = Path(page_client.__file__).parent
 def made(role=Role.STEER, actions=None):
     shown = []
     return PageClient(fleet(), actions or Recorded(), role, shown.append), shown
-
-
-def test_every_method_of_actions_is_an_action_or_a_read():
-    methods = {name for name in vars(Actions) if not name.startswith("_")} - {"available"}
-    assert methods == {*LABELS, *READS}
 
 
 def test_an_action_is_called_shown_and_logged():
@@ -91,28 +85,3 @@ def test_stopping_does_not_wait_for_actions_that_hang():
 
     client, _ = made(actions=Hanging())
     assert asyncio.run(stop_while_all_hang(client)) == Answer(True, "done")
-
-
-def test_panels_call_actions_through_the_page_client_alone():
-    """The role is checked there, so nothing may go past it."""
-    direct = {
-        path.name
-        for path in [*WEB.glob("*_panel*.py"), WEB / "flight_bar.py", WEB / "page.py"]
-        if re.search(r"\b_?actions\.\w+\(", path.read_text())
-    }
-    assert direct == set()
-
-
-def test_listeners_hear_of_a_selection_once():
-    client, _ = made()
-    heard = []
-    client.on_select(heard.append)
-    for robot in (1, 1, None):
-        client.select(robot)
-    assert heard == [1, None]
-
-
-def test_names_and_colours_of_unknown_robots():
-    client, _ = made()
-    assert (client.name(1), client.colour(1)) == ("quad1", "#e06010")
-    assert (client.name(7), client.colour(7), client.row(7)) == ("quad7", "#808080", None)

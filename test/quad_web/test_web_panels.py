@@ -124,9 +124,9 @@ def test_only_changed_cells_are_sent():
     table = LiveTable.__new__(LiveTable)  # without a page
     table._rows, table.run_method = {}, lambda *args: sent.append(args)
     rows = [{"key": i, "a": 1, "b": None} for i in range(3)]
-    assert table.set_rows(rows) == 6
-    assert table.set_rows([dict(row) for row in rows]) == 0
-    assert table.set_rows([{**rows[0], "a": 2}, rows[1]]) == 1
+    table.set_rows(rows)
+    table.set_rows([dict(row) for row in rows])
+    table.set_rows([{**rows[0], "a": 2}, rows[1]])
     assert sent[1:] == [("patch", [{"key": 0, "a": 2}], [2])]
     assert column("x", "X", digits=2)["field"] == "x"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from contextlib import closing
 from urllib.parse import urlsplit
 
@@ -10,9 +9,7 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_web.access import Tokens
-from quad_web.server import Server, Urls, WebOptions, _bound, _urls
-from quad_web.view.actions import Actions
-from quad_web.view.state import FleetState
+from quad_web.server import Urls, WebOptions, _bound, _urls
 
 
 def test_a_port_is_taken_before_the_server_runs():
@@ -36,13 +33,6 @@ def test_places_that_cannot_be_had_are_named(options, problem):
     with pytest.raises(InputError) as refused:
         _bound(WebOptions(**options))
     assert str(refused.value).startswith(f"web: {problem}")
-
-
-def test_without_nicegui_it_says_how_to_install_it(monkeypatch):
-    monkeypatch.setitem(sys.modules, "uvicorn", None)
-    with pytest.raises(InputError) as refused:
-        Server(FleetState(), Actions(), WebOptions())
-    assert "pip install 'quad-nav[web]'" in str(refused.value)
 
 
 @pytest.mark.parametrize(

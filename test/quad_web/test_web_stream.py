@@ -130,16 +130,6 @@ def test_nothing_is_sent_before_the_last_message_is_acknowledged(state, monkeypa
     assert [item["data"] for item in header["items"]] == [49]  # the newest alone
 
 
-def test_changes_of_other_threads_are_sent(state):
-    async def scenario(page, stream):
-        await page.header()
-        loop = asyncio.get_running_loop()
-        await loop.run_in_executor(None, state.put, "goals")
-        return await page.header()
-
-    assert keys(run(state, scenario)) == ["goals"]
-
-
 def test_page_that_leaves_is_forgotten(state):
     async def scenario(page, stream):
         await page.header()
@@ -196,18 +186,6 @@ def test_page_that_does_not_acknowledge_is_dropped(state, monkeypatch):
     closed = run(state, scenario)
     assert closed["reason"] == "no acknowledgement of message 0 within 0.05 s"
     assert state.wanted() == ()
-
-
-def test_page_that_does_not_read_is_dropped(state, monkeypatch):
-    monkeypatch.setattr(web_stream, "ACKNOWLEDGES_WITHIN_S", 0.05)
-
-    async def scenario(page, stream):
-        deaf = Page(stream, reads=False)
-        await page.header()
-        await asyncio.wait_for(deaf.task, PATIENCE_S)
-        return len(state.wanted())
-
-    assert run(state, scenario) == 1  # the other page
 
 
 def test_more_pages_than_are_served_are_told_so(state, monkeypatch):

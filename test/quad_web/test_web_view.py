@@ -136,7 +136,6 @@ def test_without_a_server_the_flight_goes_on_as_fast_as_it_goes():
     page = FakePage(clock)
     track = Track()
     track.doings = {20: lambda: setattr(page, "is_alive", False)}
-    page.can_take = True
     summary = fly(setup_of(time_limit_s=2.0), [track, WebView(page, FlightActions(1.0), clock)])
     assert summary.sim_time_s == 2.0
     assert clock.now_s - 100.0 == pytest.approx(0.5, abs=0.11)
@@ -234,7 +233,7 @@ def test_a_goal_of_a_person_is_flown_and_the_mission_goes_on(tmp_path, processes
     start = [setup.scene.starts[0].x_m, setup.scene.starts[0].y_m]
     pose = Pose2D(start[0] + 1.0, start[1], 0.0)
     summary, actions, page, track = flown(
-        setup, {40: lambda page: page.do("send_goal", robot=0, pose=pose)}, processes
+        setup, {40: lambda page: page.do("send_goal", 0, pose)}, processes
     )
     assert page.answers[0].ok and page.answers[0].text.startswith("quad0: sent to (")
     assert actions.done[0].endswith(page.answers[0].text)
@@ -248,7 +247,7 @@ def test_a_goal_of_a_person_is_flown_and_the_mission_goes_on(tmp_path, processes
 def test_a_cancelled_goal_is_skipped(tmp_path):
     goals = write_goals(tmp_path / "g", [[9.0, 5.5]], [[4.0, 3.5]])
     summary, actions, page, _ = flown(
-        setup_of(goals, time_limit_s=60.0), {40: lambda page: page.do("cancel", robot=0)}
+        setup_of(goals, time_limit_s=60.0), {40: lambda page: page.do("cancel", 0)}
     )
     first, second = summary.robots
     assert first.legs[0].reason == "cancelled by another node" and second.legs[0].reached
@@ -259,21 +258,21 @@ def test_stop_all_ends_the_flight():
     summary, actions, page, _ = flown(setup_of(), {40: lambda page: page.do("stop_all")})
     assert summary.reason == STOPPED and summary.sim_time_s < 1.2
     assert page.state.item("flight").data["state"] == "ended"
-    refused = actions.carry_out("cancel", {"robot": 0})
+    refused = actions.call("cancel", 0)
     assert not refused.ok and "has ended" in refused.text
-    assert actions.carry_out("reset", {}).ok and actions.stop_reason == STARTED_AGAIN
+    assert actions.call("reset").ok and actions.stop_reason == STARTED_AGAIN
 
 
 @pytest.mark.parametrize("processes", [1, 2])
 def test_parameters_lidars_and_costmaps_change_in_flight(processes):
     def look(page):
-        page.do("parameters", robot=1)
-        page.do("set_parameters", robot=1, namespace="", values={"planner_patience": 7.5})
-        page.do("set_parameters", robot=1, namespace="", values={"planner_patience": "x"})
-        page.do("enable_lidar", robot=1, is_on=False)
-        page.do("clear_costmaps", robot=0)
-        page.do("parameters", robot=1)
-        page.do("clear_costmaps", robot=9)
+        page.do("parameters", 1)
+        page.do("set_parameters", 1, "", {"planner_patience": 7.5})
+        page.do("set_parameters", 1, "", {"planner_patience": "x"})
+        page.do("enable_lidar", 1, False)
+        page.do("clear_costmaps", 0)
+        page.do("parameters", 1)
+        page.do("clear_costmaps", 9)
 
     _, actions, page, _ = flown(setup_of(time_limit_s=3.0), {40: look}, processes)
     before, changed, refused, lidar, cleared, after, unknown = page.answers
@@ -292,8 +291,8 @@ def test_parameters_lidars_and_costmaps_change_in_flight(processes):
 
 def test_a_goal_off_the_arena_is_refused_as_in_files():
     def send(page):
-        page.do("send_goal", robot=None, pose=Pose2D(-50.0, 0.0, 0.0))
-        page.do("send_goal", robot=None, pose=Pose2D(float("nan"), 0.0, 0.0))
+        page.do("send_goal", None, Pose2D(-50.0, 0.0, 0.0))
+        page.do("send_goal", None, Pose2D(float("nan"), 0.0, 0.0))
 
     summary, actions, page, _ = flown(setup_of(), {20: send})
     assert [answer.ok for answer in page.answers] == [False, False]
@@ -307,18 +306,10 @@ def test_saved_goals_are_flown(tmp_path):
     x_m, y_m = setup.scene.starts[0].x_m + 1.0, setup.scene.starts[0].y_m
 
     def save(page):
-        page.do("goal_files")
+        goals = [GoalChange(0, x_m, y_m, None)]
+        page.do("save_goals", 0, page.answers[0][0].version, goals)
 
-    def save_then(page):
-        files = page.answers[0]
-        page.do(
-            "save_goals",
-            robot=0,
-            version=files[0].version,
-            goals=[GoalChange(0, x_m, y_m, None)],
-        )
-
-    summary, _, page, _ = flown(setup, {10: save, 14: save_then})
+    summary, _, page, _ = flown(setup, {10: lambda page: page.do("goal_files"), 14: save})
     assert page.answers[1].ok, page.answers[1].text
     assert summary.success and summary.robots[0].legs[0].goal.x_m == x_m
     assert json.loads((goals / "quad0_goals.json").read_text()) == {"goals": [[x_m, y_m]]}

@@ -24,6 +24,16 @@ PATIENCE_S = 120.0  # wall time; generous, because a condition that holds ends t
 PUBLISHERS = ("/simulator", "/move_base0", "/move_base1")
 
 
+def wait(condition, what, patience_s=PATIENCE_S):
+    """Until the condition holds; a failure names ``what``, or what it returns."""
+    end = time.monotonic() + patience_s
+    while time.monotonic() < end and not rospy.is_shutdown():
+        if condition():
+            return
+        time.sleep(0.02)
+    raise AssertionError(f"not within {patience_s:g} s: {what() if callable(what) else what}")
+
+
 def topics_sent_here(nodes=PUBLISHERS):
     """The topics that nodes, by default simulator and navigators, send to this node.
 
@@ -150,15 +160,7 @@ class FlightCase(unittest.TestCase):
             "navigators that send their results",
         )
 
-    @staticmethod
-    def wait(condition, what, patience_s=PATIENCE_S):
-        """Until the condition holds; a failure names ``what``, or what it returns."""
-        end = time.monotonic() + patience_s
-        while time.monotonic() < end and not rospy.is_shutdown():
-            if condition():
-                return
-            time.sleep(0.02)
-        raise AssertionError(f"not within {patience_s:g} s: {what() if callable(what) else what}")
+    wait = staticmethod(wait)
 
     def record(self, topic, message_type, nodes=PUBLISHERS):
         record = Record(topic, message_type)

@@ -5,14 +5,13 @@ import os
 import signal
 import subprocess
 import sys
-import time
 import unittest
 from pathlib import Path
 
 import rosnode
 import rospy
 import rostest
-from flight_case import PATIENCE_S, Latest, pid_of
+from flight_case import PATIENCE_S, Latest, pid_of, wait
 from processes import descendants, runs
 from rosgraph_msgs.msg import Clock
 
@@ -39,33 +38,26 @@ class ComposedProcesses(unittest.TestCase):
         self.addCleanup(lambda: runs(simulator.pid) and os.killpg(simulator.pid, signal.SIGKILL))
         return simulator
 
-    def wait(self, condition, what):
-        end = time.monotonic() + PATIENCE_S
-        while not condition():
-            self.assertLess(time.monotonic(), end, f"not in time: {what}")
-            time.sleep(0.02)
-
     def test_no_worker_outlives_the_simulator(self):
         for number, status in ((signal.SIGKILL, -signal.SIGKILL), (signal.SIGINT, 0)):
             simulator = self.start()
-            self.wait(lambda: pid_of("/fleet1") is not None, "/fleet1")
+            wait(lambda: pid_of("/fleet1") is not None, "/fleet1")
             rospy.wait_for_service("/simulation/start", PATIENCE_S)
             workers = descendants(simulator.pid)
             self.assertIn(pid_of("/fleet1"), workers)
             simulator.send_signal(number)
             self.assertEqual(simulator.wait(PATIENCE_S), status)
-            self.wait(lambda w=workers: not any(map(runs, w)), "the end of the workers")
+            wait(lambda w=workers: not any(map(runs, w)), "the end of the workers")
 
     def test_a_simulator_that_ros_shuts_down_ends_in_order(self):
-        for _ in range(3):
-            simulator = self.start(rate=1000.0, start_paused=False)
-            clock = Latest("/clock", Clock)
-            self.wait(lambda c=clock: c.count > 100, "a running simulation")
-            workers = descendants(simulator.pid)
-            rosnode.kill_nodes(["/simulator"])
-            self.assertEqual(simulator.wait(PATIENCE_S), 0)
-            self.assertNotIn(b"Traceback", simulator.stderr.read())
-            self.wait(lambda w=workers: not any(map(runs, w)), "the end of the workers")
+        simulator = self.start(rate=1000.0, start_paused=False)
+        clock = Latest("/clock", Clock)
+        wait(lambda: clock.count > 100, "a running simulation")
+        workers = descendants(simulator.pid)
+        rosnode.kill_nodes(["/simulator"])
+        self.assertEqual(simulator.wait(PATIENCE_S), 0)
+        self.assertNotIn(b"Traceback", simulator.stderr.read())
+        wait(lambda: not any(map(runs, workers)), "the end of the workers")
 
     def test_faults_are_listed_and_end_the_simulator(self):
         simulator = self.start(hosts=3)

@@ -18,7 +18,7 @@ from hostile_navigators import Navigators
 from hostile_nodes import SequencerNode, Simulator
 from hostile_vehicles import FleetUnderTest, VehicleUnderTest
 
-COUNT = int(os.environ.get("QUAD_MESSAGES", "500"))
+COUNT = int(os.environ.get("QUAD_MESSAGES", "200"))
 
 
 class GeneratedMessages(unittest.TestCase):

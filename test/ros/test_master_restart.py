@@ -6,15 +6,14 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 import unittest
 from pathlib import Path
 
 import rosgraph
 import rostest
+from flight_case import wait
 
 NODE = str(Path(__file__).resolve().parents[2] / "nodes" / "simulator")
-PATIENCE_S = 60.0
 
 
 def free_port():
@@ -38,14 +37,8 @@ class MasterRestart(unittest.TestCase):
 
     def start_master(self):
         process = self.run_in_background("roscore", "-p", str(self.port))
-        self.wait(lambda: rosgraph.is_master_online(self.uri), "ROS master")
+        wait(lambda: rosgraph.is_master_online(self.uri), "ROS master")
         return process
-
-    def wait(self, condition, what):
-        end_s = time.monotonic() + PATIENCE_S
-        while not condition():
-            self.assertLess(time.monotonic(), end_s, f"no {what}")
-            time.sleep(0.05)
 
     def names(self):
         """Topics that the simulator publishes and subscribes to, and its services."""
@@ -59,14 +52,14 @@ class MasterRestart(unittest.TestCase):
         self.master.setParam("/use_sim_time", True)
         self.master.setParam("/simulator", {"robots": 1, "scene": "random"})
         self.run_in_background(sys.executable, NODE)
-        self.wait(lambda: "/simulation/start" in self.names()[2], "simulator")
-        self.wait(lambda: "/cmd_vel0" in self.names()[1], "simulator")
+        wait(lambda: "/simulation/start" in self.names()[2], "simulator")
+        wait(lambda: "/cmd_vel0" in self.names()[1], "simulator")
         before = self.names()
         first.send_signal(signal.SIGINT)
         first.wait()
         self.start_master()
-        self.wait(lambda: "/simulation/start" in self.names()[2], "service of the simulator")
-        self.wait(lambda: self.names() == before, "topic of the simulator")
+        wait(lambda: "/simulation/start" in self.names()[2], "service of the simulator")
+        wait(lambda: self.names() == before, "topic of the simulator")
 
 
 if __name__ == "__main__":

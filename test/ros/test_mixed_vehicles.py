@@ -2,52 +2,31 @@
 """A real vehicle (a stand-in) and a simulated one see each other, and touch."""
 
 import math
-import subprocess
-import sys
-import time
-import unittest
-from pathlib import Path
 
 import numpy as np
 import rospy
 import rostest
 from flight_case import trigger
 from geometry_msgs.msg import Twist, Vector3
-from nav_msgs.msg import Odometry
-from own_messages import state_of
-from quad.msg import Contact, VehicleState
+from quad.msg import Contact
 from sensor_msgs.msg import LaserScan
+from vehicle_case import VehicleCase
 
-VEHICLES = Path(__file__).resolve().parents[1] / "vehicles" / "udp_vehicles.py"
-PATIENCE_S = 60.0
 APART_M, RADIUS_M = 4.0, 0.30
 
 
-class MixedVehicles(unittest.TestCase):
+class MixedVehicles(VehicleCase):
+    COMMAND = ("udp_vehicles.py", "ardupilot:14661:3:-2:30")
+
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("test_mixed_vehicles", disable_signals=True)
-        cls.process = subprocess.Popen([sys.executable, str(VEHICLES), "ardupilot:14661:3:-2:30"])
-        cls.scans, cls.odometry, cls.contacts, cls.state = {}, {}, [], ""
-        cls.subscribers = [
-            rospy.Subscriber("/vehicle0/state", VehicleState, cls._on_state),
+        super().setUpClass()
+        cls.scans, cls.contacts = {}, []
+        cls.subscribers += [
             rospy.Subscriber("/simulation/contacts", Contact, cls._on_contact),
+            *(rospy.Subscriber(f"/scan{i}", LaserScan, cls._on_scan, i) for i in range(2)),
         ]
-        for i in range(2):
-            cls.subscribers += [
-                rospy.Subscriber(f"/scan{i}", LaserScan, cls._on_scan, i),
-                rospy.Subscriber(f"/odom{i}", Odometry, cls._on_odometry, i),
-            ]
         cls.publisher = rospy.Publisher("/cmd_vel1", Twist, queue_size=1)
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.process.terminate()
-        cls.process.wait(10.0)
-
-    @classmethod
-    def _on_state(cls, message):
-        cls.state = state_of(message)
 
     @classmethod
     def _on_contact(cls, message):
@@ -57,17 +36,6 @@ class MixedVehicles(unittest.TestCase):
     def _on_scan(cls, message, number):
         cls.scans[number] = message
 
-    @classmethod
-    def _on_odometry(cls, message, number):
-        cls.odometry[number] = message
-
-    def wait(self, condition, what):
-        end_s = time.monotonic() + PATIENCE_S
-        while not condition():
-            self.assertIsNone(self.process.poll(), "the vehicle has died")
-            self.assertLess(time.monotonic(), end_s, f"no {what}: {self.state}")
-            time.sleep(0.02)
-
     def range_m(self, number, bearing_rad):
         """Return the range of a robot's last scan in a direction."""
         scan = self.scans[number]
@@ -76,7 +44,7 @@ class MixedVehicles(unittest.TestCase):
         return float(np.array(scan.ranges)[round(offset / scan.angle_increment) % beams])
 
     def test_a_flight(self):
-        self.wait(lambda: self.state == "ready", "readiness")
+        self.wait(lambda: self.states.get(0) == "ready", "readiness")
         self.wait(lambda: set(self.scans) == set(self.odometry) == {0, 1}, "scans and odometry")
         # Before the take-off the simulated one looks over the real one, to the wall behind.
         self.assertAlmostEqual(self.range_m(1, 0.0), 5.5, delta=0.1)
@@ -93,11 +61,8 @@ class MixedVehicles(unittest.TestCase):
         self.assertEqual(self.contacts, [])
 
     def the_simulated_one_touches_the_real_one(self):
-        end_s = time.monotonic() + PATIENCE_S
-        while not self.contacts:
-            self.assertLess(time.monotonic(), end_s, f"no contact: {self.odometry[1].pose.pose}")
-            self.publisher.publish(Twist(linear=Vector3(0.6, 0.0, 0.0)))
-            time.sleep(0.05)
+        ahead = Twist(linear=Vector3(0.6, 0.0, 0.0))
+        self.wait(lambda: self.publisher.publish(ahead) or self.contacts, "contact")
         self.publisher.publish(Twist())
         contact = self.contacts[0]
         self.assertEqual((contact.robot, contact.other), ("quad0", "quad1"))

@@ -3,26 +3,29 @@
 
 import json
 import os
+import shutil
 import subprocess
 import tempfile
 import unittest
+from pathlib import Path
 
-import rospkg
 import rostest
 
-QUAD = rospkg.RosPack().get_path("quad")
+CONFIG = Path(__file__).resolve().parents[2] / "config" / "default"
 COLLECT = {**os.environ, "QUAD_COLLECT_FAULTS": "1"}
-ARGUMENTS = ["--dump-params", "quad", "two_quads.launch", "rviz:=false"]
+
+
+def dump(*arguments):
+    """Print the parameters that roslaunch would set."""
+    command = ["roslaunch", "--dump-params", "quad", *arguments, "rviz:=false"]
+    return subprocess.run(command, capture_output=True, env=COLLECT, check=False)
 
 
 def preflight(*arguments):
     """Exit status and error output for a launch with these arguments."""
-    dump = subprocess.run(
-        ["roslaunch", *ARGUMENTS, *arguments], stdout=subprocess.PIPE, env=COLLECT, check=True
-    )
     check = subprocess.run(
         ["python3", "-m", "quad_nav.ros.common.preflight"],
-        input=dump.stdout,
+        input=dump(*arguments).stdout,
         stderr=subprocess.PIPE,
         check=False,
     )
@@ -30,61 +33,72 @@ def preflight(*arguments):
 
 
 class Preflight(unittest.TestCase):
-    def test_the_tutorial_can_be_flown(self):
-        self.assertEqual(preflight("config:=tutorial")[0], 0)
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
 
-    def test_unknown_scene(self):
-        status, errors = preflight("scene:=/nowhere.yaml")
-        self.assertEqual(status, 2)
-        self.assertEqual(errors.count("/nowhere.yaml: cannot be read"), 1)
+    def test_the_tutorial_can_be_flown(self):
+        self.assertEqual(preflight("two_quads.launch", "config:=tutorial"), (0, ""))
 
     def test_faults_of_all_kinds_are_listed_together(self):
-        with tempfile.TemporaryDirectory() as folder:
-            result = os.path.join(folder, "result.json")
-            status, errors = preflight(f"goals:={folder}", "rate:=-1", f"result:={result}")
-            with open(result, encoding="utf-8") as file:
-                written = json.load(file)
+        result = self.folder / "result.json"
+        status, errors = preflight(
+            "two_quads.launch",
+            f"config:={self.folder}",
+            "goals:=/nowhere",
+            "rate:=-1",
+            f"result:={result}",
+        )
         self.assertEqual(status, 2)
-        self.assertIn("has no quad0_goals.json, quad1_goals.json", errors)
+        self.assertEqual(errors.count(f"{self.folder}: no move_base parameters found"), 1)
+        self.assertIn("goals: folder /nowhere does not exist", errors)
         self.assertIn("simulator: rate: is -1; expected a number above 0", errors)
-        self.assertEqual(written["exit_status"], 2)
-        self.assertEqual(len(written["problems"]), 2)
+        self.assertNotIn("costmap, x", errors)
+        written = json.loads(result.read_text())
+        self.assertEqual((written["exit_status"], len(written["problems"])), (2, 3))
 
     def test_goals_off_the_global_costmap_are_refused(self):
-        with tempfile.TemporaryDirectory() as folder:
-            own = os.path.join(folder, "own.yaml")
-            with open(own, "w", encoding="utf-8") as file:
-                file.write("global_costmap: {height: 3.0}\n")
-            for nav in ("quad", "move_base"):
-                status, errors = preflight(f"override0:={own}", f"nav:={nav}")
-                self.assertEqual(status, 2)
-                self.assertIn("quad0_goals.json: goals[0] (goal 1)", errors)
-                self.assertIn("is off the global costmap, x 0 to 12 m, y 0 to 3 m", errors)
-                size = "{width: 12, height: 12, origin_x: 0, origin_y: 0}\n"
-                self.assertTrue(errors.endswith(f"robot0.yaml global_costmap: {size}"), errors)
-                with open(own, "w", encoding="utf-8") as file:
-                    file.write(f"global_costmap: {size}")
-                self.assertEqual(preflight(f"override0:={own}", f"nav:={nav}")[0], 0)
-                with open(own, "w", encoding="utf-8") as file:
-                    file.write("global_costmap: {height: 3.0}\n")
-
-    def test_unreadable_parameters_are_listed_with_the_other_faults(self):
-        with tempfile.TemporaryDirectory() as folder:
-            status, errors = preflight(f"config:={folder}", "goals:=/nowhere")
+        own = self.folder / "own.yaml"
+        own.write_text("global_costmap: {height: 3.0}\n")
+        status, errors = preflight("two_quads.launch", f"override0:={own}", "nav:=move_base")
         self.assertEqual(status, 2)
-        self.assertEqual(errors.count(f"{folder}: no move_base parameters found"), 1)
-        self.assertIn("goals: folder /nowhere does not exist", errors)
-        self.assertNotIn("costmap, x", errors)
+        self.assertIn("is off the global costmap, x 0 to 12 m, y 0 to 3 m", errors)
+        size = "{width: 12, height: 12, origin_x: 0, origin_y: 0}\n"
+        self.assertTrue(errors.endswith(f"robot0.yaml global_costmap: {size}"), errors)
+        own.write_text(f"global_costmap: {size}")
+        self.assertEqual(preflight("two_quads.launch", f"override0:={own}"), (0, ""))
 
     def test_roslaunch_ends_with_the_faults_of_the_parameters(self):
         launch = subprocess.run(
-            ["roslaunch", *ARGUMENTS, "config:=/nowhere"], capture_output=True, check=False
+            ["roslaunch", "--dump-params", "quad", "two_quads.launch", "config:=/nowhere"],
+            capture_output=True,
+            check=False,
         )
         self.assertEqual(launch.stdout, b"")  # --dump-params ends with 0
-        errors = launch.stderr.decode()
         self.assertIn(
-            "quad0: invalid configuration:\n  config: /nowhere: expected a folder", errors
+            b"quad0: invalid configuration:\n  config: /nowhere: expected a folder", launch.stderr
         )
+
+    def test_a_hundred_can_be_flown(self):
+        self.assertEqual(preflight("fleet.launch", "robots:=100", "hosts:=4"), (0, ""))
+
+    def test_files_of_a_fleet_are_named_with_the_line(self):
+        shutil.copytree(CONFIG, self.folder / "own")
+        for robot, text in enumerate(
+            (
+                "controller_frequency: often\n",
+                "base_local_planner: dwa_local_planner/DWAPlannerROS\n",
+                "\nlocal_costmap:\n  resolution: -1.0\n",
+                "controller_frequency: of a robot that does not fly\n",
+            )
+        ):
+            (self.folder / "own" / f"robot{robot}.yaml").write_text(text)
+        status, errors = preflight("fleet.launch", "robots:=3", f"config:={self.folder}/own")
+        self.assertEqual(status, 2)
+        self.assertEqual(errors.count("robot0.yaml:1"), 1)
+        self.assertEqual(errors.count("robot2.yaml:3"), 1)
+        self.assertNotIn("robot1.yaml", errors)
+        self.assertNotIn("robot3.yaml", errors)
 
 
 if __name__ == "__main__":

@@ -79,7 +79,7 @@ class Respawn(FlightCase):
         for wrong in (float("nan"), -1.0):
             client.update_configuration({"rate": wrong})
             self.assertGreater(client.get_configuration()["rate"], 0.0)
-        client.update_configuration({"rate": 2.0})
+        client.update_configuration({"rate": 3.0})
 
     def it_stays_stopped_over_the_death_of_the_sequencer(self):
         self.assertIn("/mission/resume", trigger("/mission/stop"))

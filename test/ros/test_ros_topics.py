@@ -12,65 +12,38 @@ from geometry_msgs.msg import PolygonStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 from tf2_msgs.msg import TFMessage
+from upstream_case import recorded_lines
 
 from quad_nav.topics.robot_topics import ROBOT_TOPICS
 
-TYPES = {
-    "/cmd_vel{i}": "geometry_msgs/Twist",
+OURS = {  # beside those of C++ move_base
     "/odom{i}": "nav_msgs/Odometry",
     "/scan{i}": "sensor_msgs/LaserScan",
-    "/move_base{i}/goal": "move_base_msgs/MoveBaseActionGoal",
-    "/move_base{i}/feedback": "move_base_msgs/MoveBaseActionFeedback",
-    "/move_base{i}/result": "move_base_msgs/MoveBaseActionResult",
-    "/move_base{i}/status": "actionlib_msgs/GoalStatusArray",
-    "/move_base{i}/recovery_status": "move_base_msgs/RecoveryStatus",
-    "/move_base{i}/current_goal": "geometry_msgs/PoseStamped",
-    "/move_base{i}/NavfnROS/plan": "nav_msgs/Path",
-    "/move_base{i}/TrajectoryPlannerROS/cost_cloud": "sensor_msgs/PointCloud2",
-    "/move_base{i}/TrajectoryPlannerROS/global_plan": "nav_msgs/Path",
-    "/move_base{i}/TrajectoryPlannerROS/local_plan": "nav_msgs/Path",
-    "/move_base{i}/global_costmap/costmap": "nav_msgs/OccupancyGrid",
-    "/move_base{i}/global_costmap/costmap_updates": "map_msgs/OccupancyGridUpdate",
-    "/move_base{i}/global_costmap/footprint": "geometry_msgs/PolygonStamped",
-    "/move_base{i}/local_costmap/costmap": "nav_msgs/OccupancyGrid",
-    "/move_base{i}/local_costmap/costmap_updates": "map_msgs/OccupancyGridUpdate",
-    "/move_base{i}/local_costmap/footprint": "geometry_msgs/PolygonStamped",
     **{f"/move_base{{i}}/{topic.name}": topic.kind for topic in ROBOT_TOPICS},
     "/quad/flight": "quad/FlightInfo",
     "/simulation/contacts": "quad/Contact",
-    "/move_base{i}/parameter_descriptions": "dynamic_reconfigure/ConfigDescription",
-    "/move_base{i}/parameter_updates": "dynamic_reconfigure/Config",
 }
-SERVICES = {
-    "/move_base{i}/make_plan": "nav_msgs/GetPlan",
-    "/move_base{i}/NavfnROS/make_plan": "nav_msgs/GetPlan",
-    "/move_base{i}/clear_costmaps": "std_srvs/Empty",
-    "/move_base{i}/set_parameters": "dynamic_reconfigure/Reconfigure",
-    "/move_base{i}/TrajectoryPlannerROS/set_parameters": "dynamic_reconfigure/Reconfigure",
-    "/move_base{i}/global_costmap/set_parameters": "dynamic_reconfigure/Reconfigure",
-    "/move_base{i}/global_costmap/obstacle_layer/set_parameters": "dynamic_reconfigure/Reconfigure",
-    "/move_base{i}/local_costmap/inflation_layer/set_parameters": "dynamic_reconfigure/Reconfigure",
-}
-SUBSCRIBED = {
-    "/move_base{i}/cancel": "actionlib_msgs/GoalID",
-    "/move_base_simple/goal{i}": "geometry_msgs/PoseStamped",
-}
+OF_A_NODE = ("/get_loggers", "/set_logger_level")
 
 
-def names_of(table, i):
-    return {name.format(i=i): kind for name, kind in table.items()}
+def services(i):
+    """Services of a robot with their types, apart from those of a node."""
+    recorded = dict(recorded_lines("services.txt", i))
+    return {name: kind for name, kind in recorded.items() if not name.endswith(OF_A_NODE)}
 
 
 def absent(robots):
     """Topics and services of these robots that are missing or have another type."""
-    _, subscriptions, services = rosgraph.Master("/test").getSystemState()
-    published = dict(rospy.get_published_topics())
-    heard, served = dict(subscriptions), dict(services)
+    _, subscriptions, served = rosgraph.Master("/test").getSystemState()
+    published, heard, served = dict(rospy.get_published_topics()), dict(subscriptions), dict(served)
     names = []
     for i in robots:
-        names += [name for name, kind in names_of(TYPES, i).items() if published.get(name) != kind]
-        names += [name for name in names_of(SUBSCRIBED, i) if name not in heard]
-        names += [name for name in names_of(SERVICES, i) if name not in served]
+        types = {name: kind for name, kind, *_ in recorded_lines("publications.txt", i)}
+        types.update({name.format(i=i): kind for name, kind in OURS.items()})
+        names += [name for name, kind in types.items() if published.get(name) != kind]
+        subscribed = (f"/move_base{i}/cancel", f"/move_base_simple/goal{i}")
+        names += [name for name in subscribed if name not in heard]
+        names += [name for name in services(i) if name not in served]
     return names
 
 
@@ -83,7 +56,7 @@ class RosTopics(FlightCase):
     def test_every_topic_and_service_has_its_type(self):
         self.wait(lambda: not absent((0, 1)), lambda: f"{absent((0, 1))} with their types")
         for i in (0, 1):
-            for name, kind in names_of(SERVICES, i).items():
+            for name, kind in services(i).items():
                 self.assertEqual(rosservice.get_service_type(name), kind, name)
 
     def test_rates_in_simulated_time(self):

@@ -5,11 +5,7 @@ import math
 import os
 import signal
 import socket
-import subprocess
-import sys
 import time
-import unittest
-from pathlib import Path
 from xmlrpc.client import ServerProxy
 
 import actionlib
@@ -18,72 +14,37 @@ import rospy
 import rostest
 import tf2_ros
 from actionlib_msgs.msg import GoalStatus
-from flight_case import pid_of, trigger
-from nav_msgs.msg import Odometry
-from own_messages import event_of, state_of
+from flight_case import PATIENCE_S, pid_of, trigger
+from own_messages import event_of
 from pymavlink.dialects.v20 import ardupilotmega
 from quad.msg import LandAction, LandGoal, MissionEvent, TakeOffAction, TakeOffGoal, VehicleState
 from std_msgs.msg import Empty
+from vehicle_case import VehicleCase
 
 from quad_nav.mission.actions import Event
 
 HEARTBEAT = ardupilotmega.MAVLink_heartbeat_message(2, 3, 81, 9, 3, 3)
 GCS_TIMEOUT_S = 15.0  # a bridge takes 4 s to come back, longer on a loaded machine
-VEHICLES = Path(__file__).resolve().parents[1] / "vehicles" / "udp_vehicles.py"
-PATIENCE_S = 60.0
 ACTIONS = {"take_off": (TakeOffAction, TakeOffGoal()), "land": (LandAction, LandGoal())}
 
 
-class Vehicles(unittest.TestCase):
+class Vehicles(VehicleCase):
+    COMMAND = (
+        "udp_vehicles.py",
+        f"--gcs-timeout={GCS_TIMEOUT_S}",
+        "ardupilot:14651:3:-2:30",
+        "px4:14652:0:0:200",
+    )
+
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("test_vehicles", disable_signals=True)
-        cls.process = subprocess.Popen(
-            [
-                sys.executable,
-                str(VEHICLES),
-                f"--gcs-timeout={GCS_TIMEOUT_S}",
-                "ardupilot:14651:3:-2:30",
-                "px4:14652:0:0:200",
-            ]
-        )
-        cls.states, cls.values, cls.odometry, cls.events = {}, {}, {}, []
+        super().setUpClass()
+        cls.events = []
         cls.buffer = tf2_ros.Buffer()
         cls.listener = tf2_ros.TransformListener(cls.buffer)
-        cls.subscribers = [rospy.Subscriber("/quad/events", MissionEvent, cls._on_event)]
-        for i in range(2):
-            cls.subscribers += [
-                rospy.Subscriber(f"/vehicle{i}/state", VehicleState, cls._on_state, i),
-                rospy.Subscriber(f"/odom{i}", Odometry, cls._on_odometry, i),
-            ]
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.process.terminate()
-        cls.process.wait(10.0)
-
-    @classmethod
-    def _on_state(cls, message, number):
-        cls.values[number], cls.states[number] = message, state_of(message)
-
-    @classmethod
-    def _on_odometry(cls, message, number):
-        cls.odometry[number] = message
-
-    @classmethod
-    def _on_event(cls, message):
-        cls.events.append(event_of(message))
-
-    def wait(self, condition, what):
-        end_s = time.monotonic() + PATIENCE_S
-        while not condition():
-            self.assertIsNone(self.process.poll(), "the vehicles have died")
-            self.assertLess(time.monotonic(), end_s, f"no {what}: {self.values}")
-            time.sleep(0.02)
-
-    def speed(self, number):
-        twist = self.odometry[number].twist.twist.linear
-        return math.hypot(twist.x, twist.y)
+        cls.subscribers.append(
+            rospy.Subscriber("/quad/events", MissionEvent, lambda m: cls.events.append(event_of(m)))
+        )
 
     def test_a_flight(self):
         self.wait(lambda: self.states.get(0) == self.states.get(1) == "flying", "flight of both")

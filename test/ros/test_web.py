@@ -101,12 +101,12 @@ class Web(FlightCase):
         shutil.rmtree(cls.folder)
 
     def do(self, name, *arguments):
-        answer = getattr(self.actions, name)(*arguments)
+        answer = self.actions.call(name, *arguments)
         self.assertTrue(answer.ok, answer.text)
         return answer.text
 
     def refuse(self, name, *arguments):
-        answer = getattr(self.actions, name)(*arguments)
+        answer = self.actions.call(name, *arguments)
         self.assertFalse(answer.ok, answer.text)
         return answer.text
 

@@ -138,3 +138,13 @@ class Bodies:
 
     def close(self):
         self._world.close()
+
+
+def warm_up():
+    """Fly a body for some steps, so that nothing is compiled in flight."""
+    bodies = Bodies()
+    bodies.lift_mps2[0] = 1.0
+    for _ in range(5):
+        bodies.set_velocity(0, 0.1, 0.0, 0.0)
+        bodies.step()
+    bodies.close()

@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from vehicles.bodies import EMPTY, Bodies
+from vehicles.bodies import EMPTY, Bodies, warm_up
 from vehicles.crazyflie import AIRFRAME, Crazyflie
 from vehicles.stand_in import advance
 
@@ -237,6 +237,7 @@ def main():
         middle = EMPTY.size_x_m / 2.0
         starts = [Pose2D(middle + APART_M * k, middle) for k in range(count)]
         bodies = Bodies(EMPTY, starts, [AIRFRAME])
+    warm_up()
     crazyflies = [Crazyflie(bodies, robot) for robot in range(count)]
     servers = [Server(port, one) for port, one in zip(options.ports, crazyflies)]
     fly(bodies, servers, crazyflies)

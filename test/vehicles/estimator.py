@@ -6,7 +6,7 @@ import math
 import random
 from dataclasses import dataclass
 
-from quad_vehicles.frames import ned_from_frd
+from quad_nav.geometry import multiply_quaternions
 
 GROUND_OFFSET_M = -0.035
 """Height that the recorded autopilot reports while it stands on the ground."""
@@ -143,6 +143,14 @@ class Estimator:
     def _rates(self):
         forward, left, up = self._bodies.turn_radps(self._robot)
         return (forward, -left, -up + self._noise[6])
+
+
+def ned_from_frd(flu_to_enu):
+    """Return an attitude of ROS, (x, y, z, w), as MAVLink's (w, x, y, z) with w >= 0."""
+    half = math.sqrt(0.5)
+    turned = multiply_quaternions(flu_to_enu, (1.0, 0.0, 0.0, 0.0))
+    x, y, z, w = multiply_quaternions((half, half, 0.0, 0.0), turned)
+    return (w, x, y, z) if w >= 0.0 else (-w, -x, -y, -z)
 
 
 def euler(quaternion):

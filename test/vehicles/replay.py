@@ -21,7 +21,8 @@ import json
 import math
 import sys
 from pathlib import Path
-from types import SimpleNamespace
+
+from vehicles.stand_in import Fields
 
 from quad_nav.geometry import Twist2D
 from quad_nav.topics.vehicle_states import State
@@ -67,13 +68,6 @@ PARAMETERS = {
     "BATT_LOW_VOLT": 10.5,
     "EK3_SRC1_POSXY": 3.0,
 }
-
-
-class Fields(SimpleNamespace):
-    """Fields of a message; one that the log leaves out is 0."""
-
-    def __getattr__(self, _):
-        return 0
 
 
 class Replay:

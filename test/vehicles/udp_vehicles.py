@@ -22,7 +22,7 @@ from pathlib import Path
 os.environ["MAVLINK20"] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from pymavlink import mavutil
-from vehicles.bodies import EMPTY, Bodies
+from vehicles.bodies import EMPTY, Bodies, warm_up
 from vehicles.estimator import LocalFrame
 from vehicles.stand_in import advance
 from vehicles.virtual_flight import AIRFRAMES, STAND_INS
@@ -74,16 +74,6 @@ class UdpVehicle:
             if "text" in values:
                 values["text"] = values["text"].encode()
             getattr(self._link.mav, f"{name.lower()}_send")(**values)
-
-
-def warm_up():
-    """Fly a body for some steps, so that nothing is compiled in flight."""
-    bodies = Bodies()
-    bodies.lift_mps2[0] = 1.0
-    for _ in range(5):
-        bodies.set_velocity(0, 0.1, 0.0, 0.0)
-        bodies.step()
-    bodies.close()
 
 
 def main():

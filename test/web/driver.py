@@ -101,4 +101,4 @@ class Driver:
         expect(self.page.locator(".q-notification").filter(has_text=text).first).to_be_visible()
 
 
-ARENA = "getElement(document.querySelector('.quad-arena'))?.arena"
+ARENA = "getElement(document.querySelector('.quad-arena'))?.view"

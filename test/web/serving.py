@@ -14,7 +14,7 @@ from typing import List
 from urllib.parse import urlsplit
 
 ROOT = Path(__file__).resolve().parents[2]
-SYNTHETIC = [sys.executable, str(Path(__file__).parent / "synthetic.py"), "--port", "0", "--calls"]
+SYNTHETIC = [sys.executable, str(Path(__file__).parent / "synthetic.py")]
 
 
 class Served:
@@ -61,14 +61,14 @@ class Served:
     def renew(self) -> None:
         """Have the synthetic fleet begin another flight; what it has printed is dropped."""
         self.lines.clear()
-        self._ask("again", "renewed")
+        self._ask("again")
 
-    def _ask(self, line: str, answer: str) -> None:
-        """Write a line to the child, and wait until it has printed the answer."""
+    def _ask(self, line: str) -> None:
+        """Write a line to the child, and wait until it has printed it."""
         self.process.stdin.write(f"{line}\n")
         self.process.stdin.flush()
         end_s = time.monotonic() + 10.0
-        while answer not in self.lines:
+        while line not in self.lines:
             assert time.monotonic() < end_s, self.lines
             time.sleep(0.01)
 
@@ -85,7 +85,7 @@ class Served:
     def calls(self) -> List[str]:
         """Return the actions that pages have called until now, such as ``('cancel', 0)``."""
         self._mark += 1
-        self._ask(f"mark {self._mark}", f"mark {self._mark}")
+        self._ask(f"mark {self._mark}")
         return [line[len("call ") :] for line in self.lines if line.startswith("call ")]
 
     @property

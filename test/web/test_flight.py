@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from browser import ROOT
 from driver import Driver
 from playwright.sync_api import expect
 
 # The first flight after a change of the kernels compiles them.
 pytestmark = pytest.mark.timeout(300)
 
-QUAD = str(Path(sys.executable).with_name("quad"))
+QUAD = [sys.executable, "-m", "quad_nav.cli"]
 
 
 @pytest.fixture(scope="module")
@@ -30,17 +32,9 @@ def goals(tmp_path_factory):
 @pytest.fixture(scope="module")
 def recording(goals, tmp_path_factory):
     file = tmp_path_factory.mktemp("recording") / "flight.bag"
-    subprocess.run([QUAD, "fly", "--goals", goals, "--record", file], check=True)
+    path = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
+    subprocess.run([*QUAD, "fly", "--goals", goals, "--record", file], check=True, env=path)
     return file
-
-
-@pytest.fixture
-def flight(serve, open_page, recording):
-    """A page of the tutorial's mission, in flight; the recording has had the kernels compiled."""
-    server = serve(command=[QUAD, "fly", "--web"])
-    driver = Driver(open_page(server.url)).is_ready()
-    expect(driver.at("time")).not_to_have_text("0:00.0", timeout=60000)
-    return driver
 
 
 def near(robot, x_m, y_m):
@@ -48,20 +42,27 @@ def near(robot, x_m, y_m):
     return f"(({{x, y}}) => Math.hypot(x - {x_m}, y - {y_m}) < 0.6)(arena.fleet.robots[{robot}])"
 
 
-def test_a_quadcopter_arrives_at_a_goal_that_was_clicked(flight):
+def test_a_quadcopter_arrives_at_a_goal_that_was_clicked_and_stop_all_ends_its_flight(
+    serve, open_page, recording
+):
+    """The tutorial's mission; the recording has had the kernels compiled."""
+    flight = Driver(open_page(serve(command=[*QUAD, "fly", "--web"]).url)).is_ready()
+    expect(flight.at("time")).not_to_have_text("0:00.0", timeout=60000)
     flight.at("robots-row-1").click()
     flight.use_goal_tool()
     flight.fit()
     flight.click_arena(8.0, 1.5)
     flight.says("quad1")
     flight.wait_for_arena(near(1, 8.0, 1.5), timeout_s=60)
+    flight.page.keyboard.press(".")
+    expect(flight.at("flight-state")).to_have_text("ended")
 
 
 def test_goals_are_edited_before_the_flight(serve, open_page, goals, tmp_path):
     """The tab of goals is open; an edit shows the new plan, and is saved to the file."""
     file = Path(shutil.copy(goals / "quad0_goals.json", tmp_path))
-    command = [sys.executable, "-m", "quad_nav.cli", "preview", "--edit", "--goals", tmp_path]
-    driver = Driver(open_page(serve(command=command).url))
+    served = serve(command=[*QUAD, "preview", "--edit", "--goals", tmp_path])
+    driver = Driver(open_page(served.url))
     expect(driver.at("flight-state")).to_have_text("ready")
     expect(driver.at("stop-all")).to_be_disabled()
     driver.at("g-y-0").fill("4.0")
@@ -72,13 +73,8 @@ def test_goals_are_edited_before_the_flight(serve, open_page, goals, tmp_path):
     assert json.loads(file.read_text())["goals"] == [[1.4, 4.0]]
 
 
-def test_stop_all_ends_a_flight(flight):
-    flight.page.keyboard.press(".")
-    expect(flight.at("flight-state")).to_have_text("ended")
-
-
 def test_a_recording_is_scrubbed(serve, open_page, recording):
-    server = serve(command=[QUAD, "replay", str(recording)])
+    server = serve(command=[*QUAD, "replay", str(recording)])
     driver = Driver(open_page(server.url)).is_ready()
     expect(driver.at("flight-state")).to_have_text("running")
     driver.at("play").click()

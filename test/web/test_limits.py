@@ -12,13 +12,11 @@ import nicegui
 import pytest
 from raw_page import channel, get, handshake_head, masked, memory_bytes, raw_page
 from stream_client import open_stream
-from synthetic_actions import SyntheticActions
-from synthetic_fleet import SyntheticFleet
+from synthetic import SyntheticActions, SyntheticFleet
 from websockets.exceptions import ConnectionClosed
 
 from quad_web import connections, page_limits
 from quad_web import server as web_server
-from quad_web.page_limits import MAX_OPENING
 from quad_web.server import Server, WebOptions
 
 TOKENS = ("--steer-token", "steer-abc", "--watch-token", "watch-def")
@@ -31,8 +29,9 @@ def here(monkeypatch):
     """A server in this process, whose system drops nobody."""
     monkeypatch.setattr(web_server, "_SILENT_FOR_MS", 600_000)
     fleet = SyntheticFleet(2)
+    actions = SyntheticActions(fleet)
     fleet.start()
-    server = Server(fleet.state, SyntheticActions(fleet), WebOptions())
+    server = Server(fleet.state, actions, WebOptions())
     server.start()
     yield server
     server.stop()
@@ -87,11 +86,16 @@ def test_a_head_without_an_end_is_refused(serve, opened):
     assert memory_bytes(server.process.pid) - before < 20 * MB
 
 
-def test_a_head_of_many_cookies_is_taken(here):
+def status_of(here, path, **headers):
     parts = urlsplit(here.urls.steer)
     connection = http.client.HTTPConnection(parts.hostname, parts.port, timeout=PATIENCE_S)
-    connection.request("GET", "/favicon.ico", headers={"Cookie": f"other={'x' * 30_000}"})
-    assert connection.getresponse().status == 200
+    connection.request("GET", path, headers=headers)
+    return connection.getresponse().status
+
+
+def test_a_head_of_many_cookies_is_taken_and_socket_io_needs_a_web_socket(here):
+    assert status_of(here, "/favicon.ico", Cookie=f"other={'x' * 30_000}") == 200
+    assert status_of(here, "/_nicegui_ws/socket.io/?EIO=4&transport=polling") == 404
 
 
 def test_connections_without_requests_keep_nobody_out(here, opened):
@@ -104,17 +108,15 @@ def test_connections_without_requests_keep_nobody_out(here, opened):
     assert sum(map(is_open, silent)) <= connections.MAX_OF_ADDRESS
 
 
-def test_many_addresses_keep_nobody_out(here, opened):
+def test_many_addresses_keep_nobody_out(here, opened, monkeypatch):
+    monkeypatch.setattr(connections, "MAX_OF_ADDRESS", 16)
+    monkeypatch.setattr(connections, "MAX_CONNECTIONS", 32)
     url = here.urls.steer
-    silent = [
-        opened(url, f"127.0.0.{address}")
-        for address in (2, 3, 4, 5)
-        for _ in range(connections.MAX_OF_ADDRESS)
-    ]
+    silent = [opened(url, f"127.0.0.{address}") for address in (2, 3, 4, 5) for _ in range(16)]
     with raw_page(url) as page:
         page.shake_hands()
         assert page.is_answered()
-    assert sum(map(is_open, silent)) <= connections.MAX_CONNECTIONS
+    assert sum(map(is_open, silent)) <= 32
 
 
 def test_web_sockets_of_one_address_leave_room_for_others(here, opened, monkeypatch):
@@ -131,16 +133,14 @@ def test_web_sockets_of_one_address_leave_room_for_others(here, opened, monkeypa
         assert page.is_answered()
 
 
-@pytest.mark.parametrize("request_before", [False, True])
-def test_a_slow_head_is_cut_off(here, opened, monkeypatch, request_before):
+def test_a_slow_head_is_cut_off_after_a_request_too(here, opened, monkeypatch):
     monkeypatch.setattr(connections, "HEAD_WITHIN_S", 0.5)
     client = opened(here.urls.steer)
-    if request_before:
-        host = urlsplit(here.urls.steer).netloc
-        client.sendall(f"HEAD /favicon.ico HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
-        assert client.recv(12) == b"HTTP/1.1 200"
-        time.sleep(0.1)
-        client.recv(10_000)
+    host = urlsplit(here.urls.steer).netloc
+    client.sendall(f"HEAD /favicon.ico HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
+    assert client.recv(12) == b"HTTP/1.1 200"
+    time.sleep(0.1)
+    client.recv(10_000)
     begin_s = time.monotonic()
     with pytest.raises(ConnectionError):
         while time.monotonic() < begin_s + PATIENCE_S:
@@ -200,37 +200,23 @@ def test_wrong_events_of_a_watching_page_print_a_line_each(serve):
     assert all(re.match(r"web: .*\w: .*\(\w+\.py:\d+\)$", line) for line in complaints)
 
 
-def test_pages_that_nobody_opens_are_forgotten(serve):
-    server = serve(*TOKENS)
-    for _ in range(MAX_OPENING + 20):
-        get(server.urls[1])
-    before = memory_bytes(server.process.pid)
-    for _ in range(100):
-        get(server.urls[1])
-    assert memory_bytes(server.process.pid) - before < 15 * MB  # 0.6 MB each
-
-
-def test_a_connected_page_is_not_forgotten(here):
+def test_a_connected_page_is_not_forgotten_and_others_are(here, monkeypatch):
+    monkeypatch.setattr(page_limits, "MAX_OPENING", 4)
     with raw_page(here.urls.steer) as page:
         page.shake_hands()
         assert page.is_answered()
-        for _ in range(MAX_OPENING + 5):
+        for _ in range(9):
             get(here.urls.steer)
         assert page.id in nicegui.Client.instances
-        assert len(nicegui.Client.instances) <= MAX_OPENING + 3  # NiceGUI has one of its own
+        assert len(nicegui.Client.instances) <= 4 + 3  # NiceGUI has one of its own
         assert page.is_answered()
 
 
-@pytest.mark.parametrize("name", ["tab_id", "document_id", "old_tab_id"])
-def test_a_page_with_a_long_name_is_refused(here, name):
+def test_a_page_has_one_name_that_is_not_long(here):
     with raw_page(here.urls.steer) as page:
-        page.shake_hands(**{name: "x" * 100_000})
+        page.shake_hands(tab_id="x" * 100_000)
         assert page.is_answered()
         assert not nicegui.Client.instances[page.id].has_socket_connection
-
-
-def test_a_page_has_one_name(here):
-    with raw_page(here.urls.steer) as page:
         for number in range(5):
             page.shake_hands(tab_id=f"tab {number}")
         assert page.is_answered()
@@ -268,10 +254,3 @@ def test_a_page_that_reads_too_slowly_is_disconnected_and_comes_back(here, monke
             nicegui.core.loop.call_soon_threadsafe(client.run_javascript, "again")
             while "again" not in page.socket.recv(PATIENCE_S):
                 pass
-
-
-def test_socket_io_needs_a_web_socket(here):
-    parts = urlsplit(here.urls.steer)
-    connection = http.client.HTTPConnection(parts.hostname, parts.port, timeout=PATIENCE_S)
-    connection.request("GET", "/_nicegui_ws/socket.io/?EIO=4&transport=polling")
-    assert connection.getresponse().status == 404

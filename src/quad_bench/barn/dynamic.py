@@ -12,21 +12,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Iterator, List, NamedTuple, Optional, Tuple
+from typing import Iterator, List, Optional, Tuple
 
 import numpy as np
 
 from quad_bench.barn.dynamic_worlds import START, DynamicWorld, load_dynamic_worlds
-from quad_bench.barn.protocol import Outcome, Run
-from quad_bench.barn.setup import SCANS_PER_S, BarnOptions, Contestant, read_contestant
+from quad_bench.barn.protocol import TIME_LIMIT_S, Run
+from quad_bench.barn.runs import judged
+from quad_bench.barn.setup import (
+    SCANS_PER_S,
+    BarnOptions,
+    BarnSetup,
+    Contestant,
+    read_contestant,
+)
+from quad_bench.flights import fly_each
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.errors import InputError
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.goal_file import GoalSequence, SequenceSettings
 from quad_nav.mission.robot_goals import RobotGoals, WatchedGoalFile
-from quad_nav.mission.summary import MissionSummary
-from quad_nav.offline import workers
 from quad_nav.offline.flight import Flight, FlightObserver, StopAtContact
 from quad_nav.offline.run import fly
 from quad_nav.scenario.flight_setup import FlightSetup
@@ -36,7 +42,6 @@ from quad_nav.sim.movers import Movers
 
 GOAL_M: Tuple[float, float] = (-9.0, 0.0)
 GOAL_TOLERANCE_M = 1.0
-TIME_LIMIT_S = 100.0
 LEFT_M = 0.1
 """Distance from the start at which the clock starts."""
 AREA: Tuple[float, float, float, float] = (-10.0, -10.0, 12.0, 10.0)
@@ -108,25 +113,10 @@ class ProtocolClock(FlightObserver):
 
 
 @dataclass(frozen=True)
-class DynamicSetup:
+class DynamicSetup(BarnSetup):
     """A contestant, the worlds, the number of runs through each, and the interpolation."""
 
-    contestant: Contestant
-    worlds: Tuple[DynamicWorld, ...]
-    runs: int
     interpolation: str = SPLINE
-
-    @property
-    def wanted(self) -> int:
-        """Number of flights."""
-        return self.runs * len(self.worlds)
-
-
-class _Task(NamedTuple):
-    contestant: Contestant
-    world: DynamicWorld
-    interpolation: str
-    run: int
 
 
 def read_dynamic_setup(
@@ -184,8 +174,7 @@ def _speed_limits(contestant: Contestant, speed_mps: float) -> List[Tuple[str, f
     """Return the parameters that limit the configuration's local planner to a speed."""
     planner = contestant.configuration.local_planner
     if isinstance(planner, TrajectoryPlannerParams):
-        names = ["max_vel_x"]
-        return [(f"TrajectoryPlannerROS/{name}", speed_mps) for name in names]
+        return [("TrajectoryPlannerROS/max_vel_x", speed_mps)]
     if isinstance(planner, DwaParams):
         return [(f"DWAPlannerROS/{name}", speed_mps) for name in ("max_vel_x", "max_vel_trans")]
     raise InputError(["--max-vel-x: the local planner has no such limit, expected 0"])
@@ -225,24 +214,13 @@ def _start_distance_m(world: DynamicWorld, interpolation: str, phase_s: float) -
 
 
 def fly_all(setup: DynamicSetup, count: int) -> Iterator[DynamicRun]:
-    """Yield every run of every world as soon as it is flown, in any order.
-
-    The runs do not depend on ``count``, the number of flights at the same time.
-
-    Raises:
-        WorkersLost: Workers died repeatedly.
-    """
+    """Yield every run of every world as soon as it is flown, in any order; see ``fly_each``."""
     tasks = [
-        _Task(setup.contestant, world, setup.interpolation, run)
+        (setup.contestant, world, setup.interpolation, run)
         for run in range(setup.runs)
         for world in setup.worlds
     ]
-    flown = workers.fly_all(workers.LocalWorkers(count), _fly_task, list(enumerate(tasks)))
-    return (run for _, run in flown)
-
-
-def _fly_task(task: _Task) -> DynamicRun:
-    return fly_world(*task)
+    return fly_each(fly_world, tasks, count)
 
 
 def fly_world(
@@ -250,34 +228,14 @@ def fly_world(
 ) -> DynamicRun:
     """Fly through a world until the goal, the first contact or the time limit."""
     setup = flight_setup(contestant, world, interpolation, run)
-    phase_s = setup.scene.motion_phase_s or 0.0
     clock = ProtocolClock()
-    return judge(fly(setup, (StopAtContact(), clock)), clock, world, run, phase_s)
-
-
-def judge(
-    summary: MissionSummary, clock: ProtocolClock, world: DynamicWorld, run: int, phase_s: float
-) -> DynamicRun:
-    """Score a flight by the benchmark's protocol; a contact at the goal is a collision."""
-    robot = summary.robots[0]
-    leg = robot.legs[0]
-    touched = summary.contacts[0] if summary.contacts else None
-    outcome = Outcome.COLLISION if touched else Outcome.SUCCESS if leg.reached else Outcome.TIME_OUT
-    assert summary.seed is not None and robot.min_clearance_m is not None
+    summary = fly(setup, (StopAtContact(), clock))
     return DynamicRun(
         world.number,
         run,
-        summary.seed,
-        outcome,
-        TIME_LIMIT_S if outcome is Outcome.TIME_OUT else clock.time_s,
-        0.0,
-        robot.path_length_m,
-        robot.min_clearance_m,
-        robot.recoveries,
-        leg.reason if outcome is Outcome.TIME_OUT and "abort" in leg.reason else "",
-        touched.other if touched else "",
-        (touched.x_m, touched.y_m) if touched else None,
-        world.difficulty,
-        phase_s,
-        clock.waited_s,
+        metric=0.0,
+        difficulty=world.difficulty,
+        phase_s=setup.scene.motion_phase_s or 0.0,
+        waited_s=clock.waited_s,
+        **judged(summary, clock.time_s),
     )

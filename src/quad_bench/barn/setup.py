@@ -21,7 +21,6 @@ from quad_nav.config.other_robots import sensor_faults
 from quad_nav.config.sources import split_source
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
-from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.errors import InputError
 from quad_nav.mission.goal import Goal
@@ -75,16 +74,12 @@ class BarnOptions:
 
 @dataclass(frozen=True)
 class Contestant:
-    """The robot and its configuration, the same in all flights.
-
-    ``name`` is the configuration's. ``frames`` are its names for the map, the body and the LIDAR.
-    """
+    """The robot and its configuration, which has the name, the same in all flights."""
 
     name: str
     configuration: Configuration
     simulation: SimulationParams
     seed: int
-    frames: Tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -92,7 +87,7 @@ class BarnSetup:
     """A contestant, the worlds, and the number of runs through each."""
 
     contestant: Contestant
-    worlds: Tuple[BarnWorld, ...]
+    worlds: Tuple[Any, ...]
     runs: int
 
     @property
@@ -184,9 +179,7 @@ def read_contestant(
         Airframe(radius_m=options.body_radius_m),
         controller_period_s=1.0 / configuration.navigator.controller_frequency_hz,
     )
-    return Contestant(
-        options.config, configuration, simulation, options.seed, _frames(configuration)
-    )
+    return Contestant(options.config, configuration, simulation, options.seed)
 
 
 def _limits(local_planner: Any) -> FlightParams:
@@ -217,25 +210,6 @@ def _static_layer_faults(configuration: Configuration, folder: Path) -> List[str
         for name, layer in costmap.layers
         if isinstance(layer, StaticLayerParams)
     ]
-
-
-def _frames(configuration: Configuration) -> Tuple[str, ...]:
-    """Names of the configuration's frames, in order: global ones, the body's, the sensors'.
-
-    Offline no frame is looked up: odometry is exact, so that every global frame is ``map``; the
-    body's frame is ``base_link0``, and every LaserScan comes from the LIDAR.
-    """
-    costmaps = (configuration.global_costmap, configuration.local_costmap)
-    names = [costmap.global_frame for costmap in costmaps]
-    names += [costmap.robot_base_frame for costmap in costmaps]
-    names += [
-        source.sensor_frame
-        for costmap in costmaps
-        for _, layer in costmap.layers
-        if isinstance(layer, ObstacleLayerParams)
-        for source in layer.sources
-    ]
-    return tuple(dict.fromkeys(name for name in names if name))
 
 
 def _blocked_starts(worlds: Tuple[BarnWorld, ...], radius_m: float, path: Path) -> List[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from quad_bench.circle.runs import CircleRun
@@ -35,21 +35,6 @@ _HEADER = [
     "detour",
     "gap\n(m)",
 ]
-_COLUMNS = (
-    "robots",
-    "radius_m",
-    "method",
-    "run",
-    "seed",
-    "succeeded",
-    "arrived",
-    "contacts",
-    "mean_arrival_s",
-    "last_arrival_s",
-    "detour",
-    "gap_m",
-    "sim_time_s",
-)
 
 
 @dataclass(frozen=True)
@@ -170,7 +155,8 @@ def to_json(results: CircleResults) -> Dict[str, Any]:
 
 def to_csv(results: CircleResults) -> str:
     """Return a row for each run."""
-    return csv_text([_run_row(run) for run in results.runs], _COLUMNS)
+    rows = [_run_row(run) for run in results.runs]
+    return csv_text(rows, list(rows[0]) if rows else [])
 
 
 def _row(robots: int, radius_m: float, method: str, row: CircleStatistics) -> List[str]:
@@ -194,34 +180,23 @@ def _figures(robots: int, radius_m: float, method: str, row: CircleStatistics) -
         "robots": robots,
         "radius_m": radius_m,
         "method": method,
-        "runs": row.runs,
-        "successes": row.successes,
+        **_rounded(asdict(row)),
         "success_interval": [rounded(end) for end in row.success_interval],
-        "touched": row.touched,
-        "mean_arrival_s": rounded(row.mean_arrival_s),
-        "last_arrival_s": rounded(row.last_arrival_s),
-        "slowest_s": rounded(row.slowest_s),
-        "detour": rounded(row.detour),
-        "gap_m": rounded(row.gap_m),
+    }
+
+
+def _rounded(values: Dict[str, Any]) -> Dict[str, Any]:
+    return {
+        name: rounded(value) if isinstance(value, float) else value
+        for name, value in values.items()
     }
 
 
 def _run_row(run: CircleRun) -> Dict[str, Any]:
-    return {
-        "robots": run.robots,
-        "radius_m": run.radius_m,
-        "method": run.method,
-        "run": run.run,
-        "seed": run.seed,
-        "succeeded": run.succeeded,
-        "arrived": run.arrived,
-        "contacts": len(run.contacts),
-        "mean_arrival_s": rounded(run.mean_arrival_s),
-        "last_arrival_s": rounded(run.last_arrival_s),
-        "detour": rounded(run.detour),
-        "gap_m": rounded(run.gap_m),
-        "sim_time_s": rounded(run.sim_time_s),
-    }
+    names = ["robots", "radius_m", "method", "run", "seed", "succeeded", "arrived", "contacts"]
+    names += ["mean_arrival_s", "last_arrival_s", "detour", "gap_m", "sim_time_s"]
+    values = {name: getattr(run, name) for name in names}
+    return _rounded({**values, "contacts": len(run.contacts)})
 
 
 def _complete(run: CircleRun) -> bool:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_bench.circle.orca import Orca
 from quad_bench.circle.setup import ARRIVED_M, ORCA, ORCA_POINTS, QUAD, Circle
+from quad_bench.flights import fly_each
 from quad_nav.geometry import Twist2D
-from quad_nav.offline import workers
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.offline.run import fly
 from quad_nav.sim.contacts import Contact
@@ -143,34 +143,18 @@ class Track:
         )
 
 
-class _Task(NamedTuple):
-    circle: Circle
-    method: str
-    run: int
-
-
 def fly_all(
     circles: Sequence[Circle], methods: Sequence[str], runs: int, count: int
 ) -> Iterator[CircleRun]:
-    """Yield every flight as soon as it is flown, in any order.
-
-    The flights do not depend on ``count``, the number of flights at the same time.
-
-    Raises:
-        WorkersLost: Workers died repeatedly.
-    """
+    """Yield every flight as soon as it is flown, in any order; see ``fly_each``."""
     tasks = [
-        _Task(circle, method, run)
-        for circle in circles
-        for run in range(runs)
-        for method in methods
+        (circle, method, run) for circle in circles for run in range(runs) for method in methods
     ]
-    flown = workers.fly_all(workers.LocalWorkers(count), _fly_task, list(enumerate(tasks)))
-    return (run for _, run in flown)
+    return fly_each(_fly, tasks, count)
 
 
-def _fly_task(task: _Task) -> CircleRun:
-    return FLIGHTS[task.method](task.circle, task.run)
+def _fly(circle: Circle, method: str, run: int) -> CircleRun:
+    return FLIGHTS[method](circle, run)
 
 
 def fly_quad(circle: Circle, run: int) -> CircleRun:
@@ -191,16 +175,8 @@ def fly_orca(circle: Circle, run: int) -> CircleRun:
     contacts: List[Contact] = []
     try:
         while not track.all_arrived and simulation.now_s < setup.time_limit_s:
-            states = RobotStates(simulation.body_state)
             if simulation.step_count % control_steps == 0:
-                velocities = orca.step(
-                    states.poses[:, :2].copy(), states.bodies.velocities_mps[:, :2].copy()
-                )
-                for robot, (vx_mps, vy_mps) in enumerate(velocities.tolist()):
-                    ahead, left = (
-                        states[robot].map_from_base.to_2d().inverse().rotate(vx_mps, vy_mps)
-                    )
-                    simulation.set_command(robot, Twist2D(ahead, left, 0.0))
+                _command(simulation, orca)
             contacts += simulation.advance(math.gcd(_ODOM_STEPS, control_steps))
             track.add(simulation.now_s, RobotStates(simulation.body_state).poses[:, :2].copy())
         return track.result(

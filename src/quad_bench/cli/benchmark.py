@@ -6,7 +6,6 @@ import json
 import sys
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Callable, Generic, Iterator, List, Mapping, Optional, Sequence, TypeVar
 
 from quad_nav.cli import EXIT_INTERRUPTED, EXIT_SUCCESS
@@ -48,15 +47,6 @@ class Flown(Generic[R]):
     runs: Sequence[R]
     interrupted: bool
     wall_time_s: float
-
-
-def benchmark_outputs(json_path: Optional[Path], csv_path: Optional[Path], quiet: bool) -> Outputs:
-    """Check the outputs of a benchmark.
-
-    Raises:
-        InputError: One of them cannot be written.
-    """
-    return Outputs({"--json": json_path, "--csv": csv_path}, quiet=quiet)
 
 
 def run_benchmark(benchmark: Benchmark[R], processes: Optional[int], quiet: bool) -> Flown[R]:

@@ -12,11 +12,7 @@ EXTRAS: Dict[str, str] = {"quad_bench": "", "quad_tune": "[tune]", "quad_web": "
 
 
 def load(module: str, wanted: str) -> Any:
-    """Import a module of an add-on.
-
-    Args:
-        module: Its dotted name.
-        wanted: What needs it, as `quad tune` or `--web`, for the message.
+    """Import a module of an add-on; ``wanted`` is what needs it, as `quad tune` or `--web`.
 
     Raises:
         ClickException: The add-on, or a library that it needs, is not installed; the message says

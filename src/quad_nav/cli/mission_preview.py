@@ -14,7 +14,6 @@ from quad_nav.cli.outputs import Outputs
 from quad_nav.errors import InputError
 from quad_nav.report.preview_page import page_data, preview_page
 from quad_nav.report.preview_picture import SUFFIXES, write_picture
-from quad_nav.scenario.flight_setup import FlightOptions
 from quad_nav.scenario.preview import MissionPreview, RobotPreview
 
 _DEFAULT_OUTPUT = Path("preview.png")
@@ -31,7 +30,10 @@ def show_mission(output: Optional[Path], open_it: bool, edit: bool, **given: Any
         options = mission_options(**given)
         preview = MissionPreview(options)
         heading = title(preview, options.config)
-        page = _goal_page(options, preview, heading) if edit else None
+        page: Any = None
+        if edit:
+            add_on = add_ons.load("quad_web.cli.goal_page", "--edit")
+            page = add_on.GoalPage(options, preview, heading)
     robots = [preview.robot(number) for number in preview.numbers]
     _report(preview, robots)
     if output is not None and (preview.scene is not None or robots):
@@ -45,11 +47,6 @@ def show_mission(output: Optional[Path], open_it: bool, edit: bool, **given: Any
             page.serve(open_it)
         sys.exit(EXIT_SUCCESS)
     sys.exit(outputs.exit_status(EXIT_BAD_INPUT if preview.problems else EXIT_SUCCESS))
-
-
-def _goal_page(options: FlightOptions, preview: MissionPreview, heading: str) -> Any:
-    """Return the ``GoalPage`` of the add-on."""
-    return add_ons.load("quad_web.cli.goal_page", "--edit").GoalPage(options, preview, heading)
 
 
 def title(preview: MissionPreview, config: str) -> str:

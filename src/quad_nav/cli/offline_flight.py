@@ -8,7 +8,7 @@ import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Mapping, Optional, Protocol, Sequence, Tuple
 
 from quad_nav.cli import EXIT_INTERRUPTED, add_ons
 from quad_nav.cli.options import echo, echo_lines, exit_on_faults, parameter, show_warnings
@@ -32,6 +32,21 @@ from quad_nav.sim.simulation_params import SimulationParams
 
 _TUTORIAL_ROBOTS = 2
 _PAGE_OPTIONS = ("address", "port", "rate", "open_it")
+
+
+class FlightPage(Protocol):
+    """The page of an add-on that shows and steers flights."""
+
+    interventions: List[str]
+
+    def observer(self) -> FlightObserver:
+        """Return what shows the next flight."""
+
+    def wants_flight(self, is_interrupted: Callable[[], bool]) -> bool:
+        """Wait until people want another flight; false if there will be none."""
+
+    def close(self) -> None:
+        """End the page."""
 
 
 def fly_mission(
@@ -59,7 +74,7 @@ def fly_mission(
         page = _page(served) if web else None
     while True:
         with exit_on_faults():
-            drawn = FlightPictures(setup, report, pictures, animate)
+            drawn = FlightPictures(setup, outputs)
             observers = _observers(record)
             if not quiet:
                 show_warnings(setup.warnings)
@@ -74,12 +89,12 @@ def fly_mission(
     sys.exit(status)
 
 
-def _page(options: Mapping[str, Any]) -> Any:
-    """Return the ``FlightPage`` of the add-on."""
-    return add_ons.load("quad_web.cli.flight_page", "--web").FlightPage(**options)
+def _page(options: Mapping[str, Any]) -> FlightPage:
+    page: FlightPage = add_ons.load("quad_web.cli.flight_page", "--web").FlightPage(**options)
+    return page
 
 
-def _is_wanted_again(page: Any) -> bool:
+def _is_wanted_again(page: FlightPage) -> bool:
     """Keep the page until Ctrl-C; return true if people want the flight again."""
     with _StopOnSignal() as stop:
         return page.wants_flight(lambda: bool(stop.stop_reason))
@@ -136,7 +151,7 @@ def _fly(
     pictures: FlightPictures,
     quiet: bool,
     processes: Optional[int],
-    page: Optional[Any],
+    page: Optional[FlightPage],
 ) -> int:
     processes = processes or processes_for(len(setup.robots))
     bar: List[FlightObserver] = [] if quiet else [ProgressBar()]
@@ -153,11 +168,11 @@ def _fly(
         for line in filter(None, (observer.stop_reason for observer in observers)):
             echo(line, err=True)
     outputs.write("--json", json.dumps(to_json(summary), indent=2, allow_nan=False))
-    for line in pictures.write(summary, outputs, overview if quiet else ""):
+    for line in pictures.write(summary, overview if quiet else ""):
         if not quiet:
             echo(line, err=True)
     if not any(observer.stop_reason for observer in observers):
-        outputs.announce_files("--record")
+        outputs.announce_file("--record")
     if summary.reason == INTERRUPTED:
         return EXIT_INTERRUPTED
     return outputs.exit_status(summary.exit_status)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Iterator, List, Mapping, Optional
+from typing import Callable, Iterator, List, Mapping, Optional
 
 from quad_nav.cli import EXIT_FAILURE
 from quad_nav.cli.options import echo, echo_lines
@@ -12,6 +12,7 @@ from quad_nav.errors import InputError
 from quad_nav.files.output import folder_faults, output_faults, reason, write_text
 
 STDOUT = Path("-")
+_KINDS = {"--output": "report", "--animate": "animation"}
 
 _Paths = Mapping[str, Optional[Path]]
 _NONE: _Paths = {}
@@ -40,22 +41,24 @@ class Outputs:
         folders: _Paths = _NONE,
         quiet: bool = False,
     ) -> None:
-        self._texts, self._files, self._quiet = texts, files, quiet
+        self._paths = {**texts, **files, **folders}
+        self._quiet = quiet
         self.has_failed = False
         faults: List[str] = []
-        for option, path in texts.items():
-            faults += output_faults(path, option) if path not in (None, STDOUT) else []
-        for option, path in files.items():
-            faults += output_faults(path, option, any_kind=False) if path is not None else []
-        for option, path in folders.items():
-            faults += folder_faults(path, option) if path is not None else []
+        for option, path in self._paths.items():
+            if path is None or (path == STDOUT and option in texts):
+                continue
+            if option in folders:
+                faults += folder_faults(path, option)
+            else:
+                faults += output_faults(path, option, any_kind=option in texts)
         if faults:
             raise InputError(faults)
 
     @property
     def use_stdout(self) -> bool:
         """True if a text goes to standard output, and everything else to stderr."""
-        return STDOUT in self._texts.values()
+        return STDOUT in self._paths.values()
 
     def exit_status(self, status: int) -> int:
         """Return the command's exit status: a failed output is a failure."""
@@ -63,7 +66,7 @@ class Outputs:
 
     def write(self, option: str, text: str) -> None:
         """Write the text of an option, if it is given; print it if that fails."""
-        path = self._texts[option]
+        path = self._paths[option]
         if path == STDOUT:
             echo_lines(text)
         elif path is not None:
@@ -76,12 +79,23 @@ class Outputs:
         if not self._quiet:
             echo(f"{kind}: {path}", err=True)
 
-    def announce_files(self, *options: str) -> None:
-        """Say that the files of these options were written, if they are given."""
-        for option in options:
-            path = self._files.get(option)
-            if path is not None:
-                self.announce(option.lstrip("-"), path)
+    def announce_file(self, option: str) -> None:
+        """Say that the file of an option was written, if it is given."""
+        path = self._paths[option]
+        if path is not None:
+            self.announce(option.lstrip("-"), path)
+
+    def path(self, option: str) -> Optional[Path]:
+        """Return the path of an option, None if it is not given."""
+        return self._paths[option]
+
+    def save(self, option: str, write: Callable[[Path], None], instead: str = "") -> Iterator[str]:
+        """Write the output of an option with a function, if it is given, and yield a line."""
+        path = self._paths[option]
+        if path is not None:
+            with self.attempt(option, path, instead):
+                write(path)
+                yield f"{_KINDS.get(option, option[2:])}: {path}"
 
     @contextmanager
     def attempt(self, option: str, path: Path, instead: str = "") -> Iterator[None]:

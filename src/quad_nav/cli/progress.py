@@ -25,7 +25,7 @@ _STARTING = "starting (the first flight after an installation compiles kernels f
 
 
 def flights_progress(quiet: bool) -> Progress:
-    """Create a bar for many flights, with the time left.
+    """Create a bar for many flights.
 
     A task has a description, and a field ``status`` with text behind the count, which ends with the
     time left; rich's own estimate counts flights that were stored earlier as fast. Start the bar
@@ -44,14 +44,10 @@ def flights_progress(quiet: bool) -> Progress:
 
 
 class FlightPace:
-    """Time that flights take, measured from those that ended.
+    """Time that flights take, measured from those that ended, so many ``processes`` at a time.
 
     The first flight of each process does not count once others have ended: it also starts the
     process and loads libraries.
-
-    Args:
-        processes: Flights at the same time.
-        clock: Returns the wall time in seconds.
     """
 
     def __init__(self, processes: int, clock: Callable[[], float] = time.monotonic) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Callable, List, Optional, Sequence, Tuple, TypeVar
 
@@ -74,17 +75,15 @@ def report(
     except InputError as error:
         echo_lines("no report written:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)
-    with outputs.attempt("--output", output):
-        page.write_page(content, output)
-        echo(f"report: {output}")
-    if pictures is not None:
-        with outputs.attempt("--pictures", pictures):
-            page.write_pictures(content, pictures)
-            echo(f"pictures: {pictures}")
+    writers = {
+        "--output": partial(page.write_page, content),
+        "--pictures": partial(page.write_pictures, content),
+    }
     if animate is not None:
-        with outputs.attempt("--animate", animate):
-            animation.animate_flight(trace, animate)
-            echo(f"animation: {animate}")
+        writers["--animate"] = partial(animation.animate_flight, trace)
+    for option, write in writers.items():
+        for line in outputs.save(option, write):
+            echo(line)
     sys.exit(outputs.exit_status(EXIT_SUCCESS))
 
 
@@ -93,13 +92,8 @@ def _read(
 ) -> List[T]:
     """Read each flight and reduce its trace at once: many whole traces do not fit in memory.
 
-    Args:
-        flights: Recordings.
-        reduce: Function of a trace whose results are returned.
-        faults: Faults found before; they are reported together with those of the flights.
-
     Raises:
-        InputError: Lists ``faults`` and every flight that cannot be read.
+        InputError: Lists ``faults``, found before, and every flight that cannot be read.
     """
     from quad_nav.recording.bag_trace import read_trace
 

@@ -31,15 +31,7 @@ _MODULES = {
     "values": "reconfiguration",
 }
 
-__all__ = [  # noqa: F822
-    "Configuration",
-    "Remark",
-    "load",
-    "load_files",
-    "reconfigurable",
-    "updated",
-    "values",
-]
+__all__ = [*_MODULES]
 
 
 def __getattr__(name: str) -> Any:

@@ -142,13 +142,7 @@ def counts(reports: Sequence[Report]) -> str:
 
 
 def table(lines: Sequence[Remark], root: str, width: int) -> str:
-    """Format faults and remarks as a table of place, kind and text.
-
-    Args:
-        lines: The faults and remarks.
-        root: Folder that paths of files are relative to.
-        width: Width of the table in characters.
-    """
+    """Format lines as a table of place, kind and text; paths of files are relative to ``root``."""
     header = ["parameter", "kind", "message"]
     left = width - _widest(header[1], [line.kind for line in lines]) - 2 * _GAP
     texts = _widest(header[2], [_what(line) for line in lines])

@@ -203,12 +203,7 @@ def _made(
     return made(
         Configuration,
         tree,
-        navigator=navigator_params(tree, listed, given),
-        **own_parts(tree),
-        global_costmap=costmap_params(tree, "global_costmap"),
-        local_costmap=costmap_params(tree, "local_costmap"),
-        global_planner=planner_params(tree, "base_global_planner"),
-        local_planner=planner_params(tree, "base_local_planner"),
+        **changing_parts(tree, listed, given),
         recoveries=recoveries(tree, listed),
         scan_filters=filters_of(tree, SCAN_FILTERS),
         command_filters=filters_of(tree, COMMAND_FILTERS),
@@ -219,24 +214,23 @@ def _made(
     )
 
 
-def navigator_params(
+def changing_parts(
     tree: Mapping[str, Any], listed: Optional[NamedTypes], given: Iterable[str]
-) -> NavigatorParams:
-    """Make the dataclass of a normalised tree.
+) -> Dict[str, Any]:
+    """Make the fields of a ``Configuration`` that may change in flight from a normalised tree.
 
     ``listed`` has (name, type) of the ``recovery_behaviors``, None without that list; ``given``
     the keys that were set.
     """
     progress = own_params(ProgressParams, tree)
-    found = made(NavigatorParams, tree, given, recovery_behaviors=listed, progress=progress)
-    return with_fixes(found, tree)
-
-
-def own_parts(tree: Mapping[str, Any]) -> Dict[str, Any]:
-    """Make the dataclasses of our own parameters that are fields of a ``Configuration``."""
+    navigator = made(NavigatorParams, tree, given, recovery_behaviors=listed, progress=progress)
     return {
+        "navigator": with_fixes(navigator, tree),
         "peers": own_params(PeerParams, tree, "peers"),
         "scan_validator": own_params(ScanValidatorParams, tree),
+        "global_planner": planner_params(tree, "base_global_planner"),
+        "local_planner": planner_params(tree, "base_local_planner"),
+        **{name: costmap_params(tree, name) for name in COSTMAPS},
     }
 
 

@@ -29,13 +29,10 @@ class Difference:
 
 
 def known_parameters(tree: Mapping[str, Any]) -> Dict[str, Any]:
-    """Return the parameters of a normalised tree that are known, for recordings.
+    """Return the parameters of a ``Configuration.to_tree`` that are known, for recordings.
 
     Unknown ones may hold anything, such as variables of the environment in a launch file.
     Parameters of plugins are not known.
-
-    Args:
-        tree: A tree of ``Configuration.to_tree``.
     """
     known = ParameterTree()
     for path, table, namespace in (*tables_of(tree), *_default_recoveries(tree)):
@@ -52,13 +49,10 @@ def known_parameters(tree: Mapping[str, Any]) -> Dict[str, Any]:
 
 
 def differences(tree: Mapping[str, Any]) -> Tuple[Difference, ...]:
-    """List the parameters of a normalised tree that differ from their defaults.
+    """List the parameters of a ``Configuration.to_tree`` that differ from their defaults.
 
     Parameters of plugins have no known default and are left out. So are the distances of the
     default recoveries, which follow from other parameters.
-
-    Args:
-        tree: A tree of ``Configuration.to_tree``.
     """
     return tuple(
         difference

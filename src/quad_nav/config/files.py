@@ -247,12 +247,7 @@ def parsed(text: str, path: Path) -> ParameterTree:
 
 
 def _tree_of_node(tree: ParameterTree, own: str) -> ParameterTree:
-    """Return the namespace of a move_base node, which may be in that of a robot.
-
-    Args:
-        tree: A file, or a dump of a parameter server.
-        own: Name of the node, if there are several.
-    """
+    """Return the namespace of the node ``own``, or of any move_base, perhaps in that of a robot."""
     inner = [join(above, name) for above in tree for name in below(tree, above)]
     for paths in (sorted(tree), sorted(inner)):
         found = {path.split("/")[-1]: path for path in paths if below(tree, path)}

@@ -15,11 +15,9 @@ from quad_nav.config.plugins import (
     SCAN_FILTER,
     Interface,
     Plugin,
-    load_class,
     plugin_of,
 )
 from quad_nav.config.reader import Namespace, check_class, named_types, subtree
-from quad_nav.errors import InputError
 from quad_nav.parameter import checked
 
 SCAN_FILTERS, COMMAND_FILTERS = "scan_filters", "command_filters"
@@ -43,21 +41,11 @@ def normalise_filters(tree: Namespace, notes: Notes) -> None:
         for name, kind in listed.items():
             subtree(tree, name, "", notes)
             if kind != own:
-                check_class(class_name(kind), interface, join(key, name), notes)
-                _check_parameters(kind, interface, name, tree[name], notes)
+                loaded = check_class(class_name(kind), interface, join(key, name), notes)
+                owner = getattr(loaded, "params_class", None)  # declares the parameters
+                for parameter, fault in () if owner is None else checked(owner, tree[name])[1]:
+                    notes.problem(join(name, parameter), fault)
         tree[key] = [{"name": name, "type": kind} for name, kind in listed.items()]
-
-
-def _check_parameters(
-    kind: str, interface: Interface, name: str, namespace: Namespace, notes: Notes
-) -> None:
-    """Report the faults of parameters that the class of a filter declares."""
-    try:
-        owner = load_class(class_name(kind), interface).params_class
-    except InputError:  # check_class has reported it
-        return
-    for parameter, fault in checked(owner, namespace)[1] if owner is not None else ():
-        notes.problem(join(name, parameter), fault)
 
 
 def filters_of(tree: Mapping[str, Any], key: str) -> Tuple[Tuple[str, FilterType], ...]:

@@ -66,8 +66,10 @@ class _Scope:
     namespace: str = ""
     given: Mapping[str, str] = field(default_factory=dict)
 
-    def below(self, namespace: str) -> _Scope:
-        return replace(self, namespace=_joined(self.namespace, namespace))
+    def inside(self, element: Element, key: str = "ns") -> _Scope:
+        """Return the scope in the namespace that an attribute of an element names."""
+        below = self.words.text(element.attributes.get(key, ""))
+        return replace(self, namespace=_joined(self.namespace, below))
 
 
 class _Reader:
@@ -166,20 +168,17 @@ class _Reader:
             if self._applies(arg, scope):
                 value = arg.attributes.get("value", arg.attributes.get("default", ""))
                 given[arg.attributes.get("name", "")] = scope.words.text(value)
-        inner = scope.below(scope.words.text(element.attributes.get("ns", "")))
         words = Substitution(path, {}, self._shared)
-        self.read(path, replace(inner, path=path, words=words, given=given))
+        self.read(path, replace(scope.inside(element), path=path, words=words, given=given))
 
     def _group(self, element: Element, scope: _Scope) -> None:
-        inner = scope.below(scope.words.text(element.attributes.get("ns", "")))
         words = replace(scope.words, arguments=dict(scope.words.arguments))
-        self._children(element, replace(inner, words=words))
+        self._children(element, replace(scope.inside(element), words=words))
 
     def _node(self, element: Element, scope: _Scope) -> None:
         if element.attributes.get("type", "") not in _TYPES:
             return
-        inner = scope.below(scope.words.text(element.attributes.get("ns", "")))
-        inner = inner.below(scope.words.text(element.attributes.get("name", "")))
+        inner = scope.inside(element).inside(element, "name")
         self._nodes.append(inner.namespace)
         self._children(element, inner)
 

@@ -65,9 +65,8 @@ class ParameterError(InputError):
 class Notes:
     """Collect faults and remarks while a tree is read.
 
-    Args:
-        place: Prefix of all paths, such as the node's name.
-        origins: Path -> "file:line" of values that come from files.
+    ``place`` is the prefix of all paths, such as the node's name; ``origins`` has "file:line" of
+    values that come from files.
     """
 
     def __init__(self, place: str, origins: Optional[Mapping[str, str]] = None) -> None:

@@ -34,10 +34,7 @@ _ALLOWED: Dict[str, Tuple[Type[Exception], ...]] = {
 def call_constructor(plugin_class: Any, methods_of: type, *arguments: Any) -> Any:
     """Make an object of a plugin's class whose methods are guarded.
 
-    Args:
-        plugin_class: The user's class.
-        methods_of: Class or protocol with the methods that this package calls.
-        arguments: Arguments of the constructor.
+    ``methods_of`` is the class or protocol with the methods that this package calls.
 
     Raises:
         InputError: The constructor refuses its parameters.

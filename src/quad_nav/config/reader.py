@@ -193,10 +193,11 @@ def named_types(entries: Any, place: str, kind: str, notes: Notes) -> Dict[str, 
     return found
 
 
-def check_class(name: str, interface: Interface, place: str, notes: Notes) -> None:
-    """Report everything that a user's class lacks of the interface."""
+def check_class(name: str, interface: Interface, place: str, notes: Notes) -> Any:
+    """Return a user's class; None, and a fault for everything that it lacks of the interface."""
     try:
-        load_class(name, interface)
+        return load_class(name, interface)
     except InputError as error:
         for problem in error.problems:
             notes.problem(place, problem)
+        return None

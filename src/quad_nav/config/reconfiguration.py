@@ -8,15 +8,13 @@ from typing import Any, Dict, List, Mapping, Tuple
 
 from quad_nav.config.configuration import (
     Configuration,
-    navigator_params,
-    own_parts,
+    changing_parts,
     tables_of,
     workload_problems,
 )
-from quad_nav.config.costmaps import costmap_params
 from quad_nav.config.files import below
 from quad_nav.config.notes import join
-from quad_nav.config.planners import SLOTS, planner_params
+from quad_nav.config.planners import SLOTS
 from quad_nav.errors import InputError
 from quad_nav.parameter import InvalidValue, Parameter
 
@@ -117,16 +115,8 @@ def _clamped(parameter: Parameter, value: Any) -> Any:
 def _remade(configuration: Configuration, namespace: str) -> Configuration:
     """Make the parts that may change in flight anew from the tree; recoveries may not."""
     tree, before = configuration.tree, configuration.navigator
-    navigator = navigator_params(tree, before.recovery_behaviors, given=tree)
+    parts = changing_parts(tree, before.recovery_behaviors, given=tree)
     if namespace:  # move_base itself is not reconfigured
         patience_s = before.controller_patience_s
-        navigator = replace(navigator, controller_patience_s=patience_s)
-    return replace(
-        configuration,
-        navigator=navigator,
-        global_planner=planner_params(tree, "base_global_planner"),
-        local_planner=planner_params(tree, "base_local_planner"),
-        global_costmap=costmap_params(tree, "global_costmap"),
-        local_costmap=costmap_params(tree, "local_costmap"),
-        **own_parts(tree),
-    )
+        parts["navigator"] = replace(parts["navigator"], controller_patience_s=patience_s)
+    return replace(configuration, **parts)

@@ -123,10 +123,7 @@ def _configuration(source: RobotSource) -> ParameterTree:
 def is_users(origin: str, number: int, override: Optional[Path]) -> bool:
     """Return whether a value is the user's for one robot or flight, not the configuration's.
 
-    Args:
-        origin: Origin of the value, as in ``ParameterTree.origins``.
-        number: Number of the robot.
-        override: The robot's file of overrides.
+    ``origin`` is one of ``ParameterTree.origins``, ``override`` the robot's file of overrides.
     """
     path = origin.rpartition(":")[0]
     own = [] if override is None else [str(override.expanduser())]

@@ -176,12 +176,8 @@ def _set_of_files(path: Path, choice: str, number: str) -> FileSet:
     """Return the set of a launch file, of one file, or of files with commas between them."""
     if is_launch_file(path):
         return FileSet(None, "", (PlacedFile(path, ()),), number, _arguments(path, choice))
-    if path.is_file():
-        return FileSet(None, "", (PlacedFile(path, ()),), number)
-    files = []
-    for word in str(path).split(","):
-        files.append(placed_file(word.strip()))
-    return FileSet(None, "", tuple(files), number)
+    words = [str(path)] if path.is_file() else str(path).split(",")
+    return FileSet(None, "", tuple(placed_file(word.strip()) for word in words), number)
 
 
 def placed_file(word: str) -> PlacedFile:

@@ -25,6 +25,9 @@ used at all, not even to tell whether a trajectory is legal.
 
 The search is that of trajectory rollout: where a sample ends, and what is under the footprint where
 all of them begin, give the least that it can cost, and samples are tried in that order.
+
+Source: D. Fox, W. Burgard, S. Thrun, "The dynamic window approach to collision avoidance", IEEE
+Robotics & Automation Magazine 4(1), 1997.
 """
 
 from __future__ import annotations
@@ -39,15 +42,10 @@ from quad_nav.control import dwa_kernel as kernel
 from quad_nav.control import dwa_search
 from quad_nav.control.dwa_oscillation import OscillationCritic
 from quad_nav.control.dwa_planner_params import DwaParams
-from quad_nav.control.dwa_samples import acceleration_limits, velocity_samples
-from quad_nav.control.map_grid_kernel import distances_ahead
-from quad_nav.control.rollout import (
-    Trajectory,
-    Triple,
-    costmap_view,
-    single,
-)
-from quad_nav.costmap.collision import highest_near
+from quad_nav.control.map_grid import distances_ahead
+from quad_nav.control.rollout import Trajectory, single
+from quad_nav.costmap.collision import Triple, highest_near
+from quad_nav.costmap.cost_grid import costmap_view
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
 
@@ -112,9 +110,7 @@ class Critics:
         """Return the cheapest sampled trajectory, of cost NO_LEGAL_TRAJECTORY if none is legal."""
         goal = Pose2D(*single(self.goal.x_m, self.goal.y_m, self.goal.yaw_rad))
         samples = velocity_samples(self.params, self.pose, self.velocity, goal, control_period_s)
-        k, cost = dwa_search.cheapest(
-            self.critics(samples, oscillation), self.start, self.velocity, samples
-        )
+        k, cost = dwa_search.cheapest(self.critics(samples, oscillation), samples)
         if k < 0:
             return Trajectory((0.0, 0.0, 0.0), NO_LEGAL_TRAJECTORY, np.zeros((0, 3)))
         points, command = self.simulate(samples[k])
@@ -128,6 +124,8 @@ class Critics:
             self.motion, self.weights, self.velocity, samples
         )
         return dwa_search.Critics(
+            self.start,
+            self.velocity,
             self.motion,
             self.map_grids,
             self.obstacles(scale),
@@ -219,4 +217,44 @@ def _motion(params: DwaParams) -> kernel.Motion:
         max_vel_trans_mps=float(params.max_vel_trans_mps),
         min_vel_theta_radps=float(params.min_vel_theta_radps),
         accelerates=not params.use_dwa,
+    )
+
+
+def velocity_samples(
+    params: DwaParams, pose: Pose2D, velocity: Triple, goal: Pose2D, control_period_s: float
+) -> NDArray[np.float64]:
+    """Return the velocities to try, a grid over those that are allowed and can be reached.
+
+    They can be reached in one control period with ``use_dwa``, else in ``sim_time_s``, and then no
+    faster than would overshoot the local goal.
+
+    Returns:
+        float64[n, 3], rows vx, vy, vtheta of single precision; vtheta varies fastest.
+    """
+    lowest, highest = _velocity_window(params, pose, velocity, goal, control_period_s)
+    counts = int(params.vx_samples), int(params.vy_samples), int(params.vth_samples)
+    return kernel.sample_grid(lowest, highest, counts)
+
+
+def acceleration_limits(params: DwaParams) -> Triple:
+    """Return the limits of x, y and theta in single precision, as upstream keeps them."""
+    return single(params.acc_lim_x_mps2, params.acc_lim_y_mps2, params.acc_lim_theta_radps2)
+
+
+def _velocity_window(
+    params: DwaParams, pose: Pose2D, velocity: Triple, goal: Pose2D, control_period_s: float
+) -> Tuple[Triple, Triple]:
+    fastest_x, fastest_y = params.max_vel_x_mps, params.max_vel_y_mps
+    period_s = control_period_s
+    if not params.use_dwa:
+        period_s = params.sim_time_s
+        no_overshoot_mps = pose.distance_to(goal) / params.sim_time_s
+        fastest_x = max(min(fastest_x, no_overshoot_mps), params.min_vel_x_mps)
+        fastest_y = max(min(fastest_y, no_overshoot_mps), params.min_vel_y_mps)
+    slowest = params.min_vel_x_mps, params.min_vel_y_mps, -params.max_vel_theta_radps
+    fastest = fastest_x, fastest_y, params.max_vel_theta_radps
+    change = [limit * period_s for limit in acceleration_limits(params)]
+    return (
+        single(*(max(a, v - c) for a, v, c in zip(slowest, velocity, change))),
+        single(*(min(a, v + c) for a, v, c in zip(fastest, velocity, change))),
     )

@@ -132,14 +132,7 @@ def simulate(
     sample: NDArray[np.float64],
     points: NDArray[np.float64],
 ) -> Tuple[int, Triple]:
-    """Simulate a sample.
-
-    Args:
-        motion: Parameters of the simulation.
-        pose: Pose of the robot.
-        velocity: Velocity of the robot.
-        sample: float64[3], vx, vy, vtheta.
-        points: float64[k, 3], filled with poses.
+    """Simulate a sample, float64[3], from the robot's pose and velocity; fill poses, float64[k, 3].
 
     Returns:
         The number of poses, and the command: the sample, or what comes nearest to it after
@@ -203,12 +196,7 @@ def is_within_reach(
 ) -> bool:
     """Tell whether path and goal are in reach from every pose, and it and its nose on the map.
 
-    Args:
-        grids: Distance grids.
-        points: float64[k, 3], poses.
-        count: Number of poses.
-        distances: float64[4], filled with the last pose's distances; those that do not count
-            stay.
+    The last pose's distances fill float64[4]; those that do not count stay.
     """
     if grids.follows_path or grids.follows_goal:
         for k in range(count):
@@ -274,15 +262,9 @@ def obstacle_cost(
 ) -> float:
     """Return the highest cost under the scaled footprint, or their sum; -1 on collision.
 
-    Poses are examined from the last one on, where most trajectories collide that do.
-
-    Args:
-        obstacles: Input of the obstacle critic.
-        footprint_scale: Factor of the footprint's size.
-        points: float64[k, 3], poses.
-        count: Number of poses.
-        terms: float64[n], the other critics' parts of the cost.
-        limit: Highest cost of interest: where the result leads to more, it may be too low.
+    Poses, ``count`` rows of float64[k, 3], are examined from the last one on, where most
+    trajectories collide that do. Where the result leads, with the other critics' terms, to more
+    than the limit, it may be too low.
     """
     if count > 0 and not math.isfinite(footprint_scale):
         return -1.0
@@ -307,13 +289,12 @@ def cost_of_pose(
 
     It is 0 where the cost is no more than a known one.
     """
-    x, y, theta = pose
-    cell_x, cell_y = cell_of(obstacles.costmap, x, y)
+    cell_x, cell_y = cell_of(obstacles.costmap, pose[0], pose[1])
     if cell_x < 0 or cell_y < 0:
         return -1.0
     if obstacles.highest_near[cell_y, cell_x] <= known:
         return 0.0
-    cost = footprint_cost(obstacles.costmap, footprint, x, y, theta)
+    cost = footprint_cost(obstacles.costmap, footprint, pose)
     return -1.0 if cost < 0.0 else max(cost, float(obstacles.costmap.costs[cell_y, cell_x]))
 
 

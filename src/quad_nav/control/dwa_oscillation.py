@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Tuple
 
 from quad_nav.control.dwa_search import Directions
-from quad_nav.control.rollout import Triple
+from quad_nav.costmap.collision import Triple
 from quad_nav.geometry import Pose2D
 
 
@@ -81,14 +81,10 @@ class OscillationCritic:
         reset_dist_m: float,
         reset_angle_rad: float,
     ) -> None:
-        """Record a chosen command.
+        """Record a chosen command (vx, vy, vtheta) at a pose in the local costmap's frame.
 
-        Args:
-            command: (vx, vy, vtheta).
-            pose: Pose of the robot in the local costmap's frame.
-            slow_mps: Forward speed up to which sideways motion and turns count.
-            reset_dist_m: Distance from the last reversal after which all is allowed again.
-            reset_angle_rad: Turn since the last reversal after which all is allowed again.
+        Up to a forward speed of ``slow_mps`` sideways motion and turns count. All is allowed again
+        at a distance, or after a turn, from the last reversal.
         """
         reversals = [self.forward.record(command[0])]
         if abs(command[0]) <= slow_mps:

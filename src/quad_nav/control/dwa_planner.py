@@ -1,9 +1,9 @@
 """The controller ``dwa_local_planner/DWAPlannerROS``: the dynamic window approach.
 
-Each call cuts the global plan to the local costmap, samples velocities (``dwa_samples``) and
-takes the one with the cheapest trajectory for the critics (``dwa_critics``, ``dwa_oscillation``).
+Each call cuts the global plan to the local costmap, samples velocities and takes the one
+with the cheapest trajectory for the critics (``dwa_critics``, ``dwa_oscillation``).
 Within ``xy_goal_tolerance_m`` of the global plan's end it stops and turns in place instead
-(``goal``).
+(``plan_follower``).
 """
 
 from __future__ import annotations
@@ -15,13 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.control.controller import IDENTITY, Control
-from quad_nav.control.dwa_critics import Critics, DwaGrids
+from quad_nav.control.dwa_critics import Critics, DwaGrids, acceleration_limits
 from quad_nav.control.dwa_oscillation import OscillationCritic
 from quad_nav.control.dwa_planner_params import DwaParams
-from quad_nav.control.dwa_samples import acceleration_limits
-from quad_nav.control.goal import is_stopped, stopping_command, turning_command
 from quad_nav.control.map_grid import cost_cloud
-from quad_nav.control.plan_follower import NO_POSES, PlanFollower, plan_end
+from quad_nav.control.plan_follower import NO_POSES, PlanFollower, is_stopped, plan_end
 from quad_nav.control.rollout import Trajectory
 from quad_nav.errors import NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
@@ -94,16 +92,8 @@ class DwaPlanner(PlanFollower):
             return np.zeros((0, 7), dtype=np.float32)
         critics, costs = self.critics, self.critics.costmap.costs
         usable = (critics.grids.path < costs.size) & (costs < INSCRIBED)
-        return cost_cloud(
-            critics.spec,
-            costs,
-            critics.grids.path,
-            critics.grids.goal,
-            usable,
-            critics.path_scale,
-            critics.goal_scale,
-            critics.params.occdist_scale,
-        )
+        scales = critics.path_scale, critics.goal_scale, critics.params.occdist_scale
+        return cost_cloud(critics.costmap, critics.grids.path, critics.grids.goal, usable, scales)
 
     def _is_at(self, goal: Pose2D, pose: Pose2D) -> bool:
         latched = self.params.latch_xy_goal_tolerance and self.xy_tolerance_latch
@@ -121,26 +111,15 @@ class DwaPlanner(PlanFollower):
         if abs(turn_rad) <= self.params.yaw_goal_tolerance_rad:
             self.rotating_to_goal = False
             return Twist2D()
-        params = _in_single_precision(self.params)
-        if not self.rotating_to_goal and not is_stopped(velocity, params):
-            command = stopping_command(velocity, params, self.control_period_s)
-        else:
-            self.rotating_to_goal = True
-            command = turning_command(turn_rad, velocity, params, self.control_period_s)
+        command = self._stop_or_turn(turn_rad, velocity, _in_single_precision(self.params))
         self.oscillation.reset()
         # Upstream measures no distances here: it keeps those of the last search.
         grids = self._grids
         if grids is None or grids.path.shape != costs.shape:
             grids = DwaGrids(*np.zeros((3, *costs.shape), dtype=np.int32))
+        plan = self.local_global_plan
         self.critics = Critics(
-            self.params,
-            spec,
-            costs,
-            self.footprint,
-            self.local_global_plan,
-            pose,
-            velocity,
-            grids,
+            self.params, spec, costs, self.footprint, plan, pose, velocity, grids
         )
         if not self.critics.is_legal((command.vx_mps, command.vy_mps, command.vyaw_radps)):
             raise NoValidTrajectory(
@@ -151,15 +130,8 @@ class DwaPlanner(PlanFollower):
     def _search(
         self, spec: GridSpec, costs: NDArray[np.uint8], pose: Pose2D, velocity: Twist2D
     ) -> Trajectory:
-        self.critics = Critics(
-            self.params,
-            spec,
-            costs,
-            self.footprint,
-            self.local_global_plan,
-            pose,
-            velocity,
-        )
+        plan = self.local_global_plan
+        self.critics = Critics(self.params, spec, costs, self.footprint, plan, pose, velocity)
         self._grids = self.critics.grids
         self.best = self.critics.choose(self.oscillation, self.control_period_s)
         if self.best.cost >= 0.0:

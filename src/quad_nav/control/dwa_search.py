@@ -69,8 +69,10 @@ class Directions(NamedTuple):
 
 
 class Critics(NamedTuple):
-    """Everything that samples are scored against."""
+    """State of the robot that samples begin with, and what they are scored against."""
 
+    pose: Triple
+    velocity: Triple
     motion: Motion
     grids: MapGrids
     obstacles: Obstacles
@@ -79,16 +81,8 @@ class Critics(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def cheapest(
-    critics: Critics, pose: Triple, velocity: Triple, samples: NDArray[np.float64]
-) -> Tuple[int, float]:
-    """Find the legal sample of lowest cost, the first of equals.
-
-    Args:
-        critics: The critics.
-        pose: Pose of the robot.
-        velocity: Velocity of the robot.
-        samples: float64[n, 3].
+def cheapest(critics: Critics, samples: NDArray[np.float64]) -> Tuple[int, float]:
+    """Find the legal sample, of float64[n, 3], of lowest cost, the first of equals.
 
     Returns:
         Index and cost; (-1, inf) if no sample is legal.
@@ -96,14 +90,14 @@ def cheapest(
     motion, obstacles, weights = critics.motion, critics.obstacles, critics.weights
     points = np.empty((longest(motion, samples), 3))
     terms = np.empty(TERMS)
-    bounds = least_costs(critics, pose, velocity, samples, points)
+    bounds = least_costs(critics, samples, points)
     best, best_cost = -1, np.inf
     for _ in range(samples.shape[0]):
         k = int(np.argmin(bounds))
         if bounds[k] == np.inf or bounds[k] > best_cost:
             break
         bounds[k] = np.inf
-        count, command = simulate(motion, pose, velocity, samples[k], points)
+        count, command = simulate(motion, critics.pose, critics.velocity, samples[k], points)
         distances = np.zeros(4)
         if not is_within_reach(critics.grids, points, count, distances):
             continue
@@ -172,28 +166,14 @@ def is_forbidden(directions: Directions, command: Triple) -> bool:
 
 @njit(cache=True, nogil=True)
 def least_costs(
-    critics: Critics,
-    pose: Triple,
-    velocity: Triple,
-    samples: NDArray[np.float64],
-    points: NDArray[np.float64],
+    critics: Critics, samples: NDArray[np.float64], points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the least that samples cost if they are legal, inf for some that are not.
+    """Return the least that samples, float64[n, 3], cost if legal, inf for some that are not.
 
     That is the cost of the last pose; of obstacles, those under the first pose and in the last
-    pose's cell count.
-
-    Args:
-        critics: The critics.
-        pose: Pose of the robot.
-        velocity: Velocity of the robot.
-        samples: float64[n, 3].
-        points: float64[k, 3], overwritten.
-
-    Returns:
-        float64[n].
+    pose's cell count. ``points``, float64[k, 3], is overwritten.
     """
-    motion = critics.motion
+    motion, pose, velocity = critics.motion, critics.pose, critics.velocity
     bounds = np.full(samples.shape[0], np.inf)
     tried = np.empty(LANES, np.int64)
     is_certain = np.empty(LANES, np.bool_)
@@ -223,18 +203,10 @@ def least_costs(
                 if at_start[i] < 0.0:
                     continue
                 bound, is_known = _cost_of_end(
-                    critics,
-                    pose,
-                    velocity,
-                    samples[tried[i]],
-                    at_start[i],
-                    state,
-                    i,
-                    distances,
-                    terms,
+                    critics, samples[tried[i]], at_start[i], state, i, distances, terms
                 )
                 if not (is_known and is_certain[i]):
-                    bound = _cost_of_last(critics, pose, velocity, samples[tried[i]], points)
+                    bound = _cost_of_last(critics, samples[tried[i]], points)
                 bounds[tried[i]] = bound
             filled = 0
     return bounds
@@ -254,8 +226,6 @@ def _cell_at(costmap: CostmapView, x_m: float, y_m: float, doubt: float) -> Tupl
 @njit(cache=True, nogil=True)
 def _cost_of_end(
     critics: Critics,
-    pose: Triple,
-    velocity: Triple,
     sample: NDArray[np.float64],
     obstacle: float,
     state: NDArray[np.float64],
@@ -269,6 +239,7 @@ def _cost_of_end(
     float64[TERMS], are overwritten.
     """
     grids, costmap = critics.grids, critics.grids.costmap
+    pose, velocity = critics.pose, critics.velocity
     resolution_m, forward_m = costmap.resolution_m, grids.forward_point_distance_m
     way_m = critics.motion.sim_time_s * (
         max(abs(sample[0]), abs(velocity[0])) + max(abs(sample[1]), abs(velocity[1]))
@@ -310,15 +281,11 @@ def _cost_of_end(
 
 @njit(cache=True, nogil=True)
 def _cost_of_last(
-    critics: Critics,
-    pose: Triple,
-    velocity: Triple,
-    sample: NDArray[np.float64],
-    points: NDArray[np.float64],
+    critics: Critics, sample: NDArray[np.float64], points: NDArray[np.float64]
 ) -> float:
     """Return the cost of a sample, float64[3], without obstacles, inf if it is illegal."""
     distances, terms = np.zeros(4), np.empty(TERMS)
-    count, command = simulate(critics.motion, pose, velocity, sample, points)
+    count, command = simulate(critics.motion, critics.pose, critics.velocity, sample, points)
     if not is_within_reach(critics.grids, points, count, distances):
         return np.inf
     fill_terms(critics.weights, distances, command, terms)

@@ -27,17 +27,11 @@ _ROUND = 0.9  # inscribed by circumscribed radius
 def escape(
     spec: GridSpec, costs: NDArray[np.uint8], footprint: NDArray[np.float64], pose: Pose2D
 ) -> Optional[Twist2D]:
-    """Return a command that leads to lower costs.
-
-    Args:
-        spec: Grid of the local costmap.
-        costs: uint8[H, W] on it.
-        footprint: float64[n, 2], metres in the robot's frame.
-        pose: Pose of the robot in the costmap's frame.
+    """Return a command that leads to lower costs, uint8[H, W] on the local costmap's grid.
 
     Returns:
-        The command; None if no direction leads to lower costs, or the footprint is not round:
-        the cells that it would sweep are not examined.
+        The command; None if no direction leads to lower costs, or the footprint, float64[n, 2], is
+        not round: the cells that it would sweep are not examined.
     """
     here = spec.cell_of(pose.x_m, pose.y_m)
     if here is None or not is_round(footprint):

@@ -16,9 +16,8 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.costmap.collision import Triple
 from quad_nav.files.kernel_cache import njit
-
-Triple = Tuple[float, float, float]
 
 LANES = 16
 ROWS = 13
@@ -44,14 +43,8 @@ def fill_lane(
 ) -> bool:
     """Fill a lane with a sample that has not moved.
 
-    Args:
-        state: float64[ROWS * LANES].
-        lane: Number of the lane.
-        theta: Heading of the robot.
-        velocity: Velocity of the robot: vx, vy, vtheta.
-        sample: Velocity that it approaches.
-        dt: Length of a step, seconds.
-        last: Number of steps before the last pose.
+    The robot's heading is theta and its velocity approaches the sample in ``last`` steps of ``dt``
+    seconds before the last pose.
 
     Returns:
         False if it turns too far in a step for its end to be certain.
@@ -66,11 +59,9 @@ def fill_lane(
 
 @njit(cache=True, nogil=True)
 def travel_lanes(state: NDArray[np.float64], limits: Triple) -> None:
-    """Move every lane to its last pose.
+    """Move every lane to its last pose, within acceleration limits of 0 or more.
 
-    Args:
-        state: float64[ROWS * LANES], changed.
-        limits: Acceleration limits of x, y and theta, 0 or more; inf to have the sample at once.
+    A limit of inf is for a lane that has its sample's velocity at once.
     """
     steps, changing = _steps(state, limits)
     for k in range(changing):
@@ -143,27 +134,18 @@ def _cos_sin(angle: float) -> Tuple[float, float]:
 def doubt_of(rounding: float, last: float, coordinate: float, reach: float, turn: float) -> float:
     """Return how far an end is off at most, in cells, from that of a simulation pose by pose.
 
-    Args:
-        rounding: Relative error of a number of the simulation.
-        last: Number of steps.
-        coordinate: Largest coordinate on the way, in cells, of either sign.
-        reach: Length of the way, in cells.
-        turn: Largest heading on the way.
+    The largest coordinate on the way, of either sign, and the length of the way are in cells, the
+    largest heading in radians; ``rounding`` is the relative error of a number of the simulation.
     """
     return 1e-6 + rounding * (last + 2.0) * (abs(coordinate) + reach * (2.0 + abs(turn)))
 
 
 @njit(cache=True, nogil=True)
 def index_of(cell: float, size: int, doubt: float) -> int:
-    """Return the index of a coordinate along an axis.
-
-    Args:
-        cell: The coordinate in cells from the grid's border.
-        size: Number of cells.
-        doubt: How far it may be off.
+    """Return the index of a coordinate, in cells from the grid's border, along an axis.
 
     Returns:
-        The index, OFF_MAP, or UNCERTAIN if it may be that of the next cell.
+        The index, OFF_MAP, or UNCERTAIN if it may be that of the next cell, by a doubt in cells.
     """
     if cell < -0.5 or cell > size + 0.5:
         return OFF_MAP if doubt < 0.5 else UNCERTAIN
@@ -175,13 +157,9 @@ def index_of(cell: float, size: int, doubt: float) -> int:
 
 @njit(cache=True, nogil=True)
 def cell_of_end(x: float, y: float, shape: Tuple[int, int], doubt: float) -> Tuple[int, int]:
-    """Return the column and the row of an end; both are OFF_MAP or UNCERTAIN where one is.
+    """Return column and row of an end, in cells from the corner of a grid of rows and columns.
 
-    Args:
-        x: Coordinate in cells from the grid's corner.
-        y: Likewise.
-        shape: Rows and columns of the grid.
-        doubt: How far the coordinates may be off, in cells.
+    Both are OFF_MAP or UNCERTAIN where one is.
     """
     column, row = index_of(x, shape[1], doubt), index_of(y, shape[0], doubt)
     if column == OFF_MAP or row == OFF_MAP:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from quad_nav.control.rollout import Triple
+from quad_nav.costmap.collision import Triple
 from quad_nav.geometry import Pose2D, angle_difference
 
 

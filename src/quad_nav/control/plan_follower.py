@@ -1,19 +1,24 @@
-"""Common part of the local planners: a plan that is cut and pruned, a goal, a footprint."""
+"""Common part of the local planners: a plan that is cut and pruned, and the stop at its goal."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.control.plan_follower_kernel import count_farther, stretch_near
+from quad_nav.control.dwa_planner_params import DwaParams
+from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.costmap.collision import Triple
 from quad_nav.errors import NoLocalPlan
-from quad_nav.geometry import Pose2D
+from quad_nav.files.kernel_cache import njit
+from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
 
 NO_POSES = np.zeros((0, 3))
+GoalLimits = Union[TrajectoryPlannerParams, DwaParams]
+"""Parameters of both local planners for stopping and turning."""
 _PASSED_BEYOND_M = 1.0
 
 
@@ -62,6 +67,13 @@ class PlanFollower:
         """Tell whether the robot has reached the goal, heading included."""
         return self._goal_reached
 
+    def _stop_or_turn(self, turn_rad: float, velocity: Twist2D, limits: GoalLimits) -> Twist2D:
+        """Return the command at the goal's position: stop, then turn to the goal's heading."""
+        if not self.rotating_to_goal and not is_stopped(velocity, limits):
+            return stopping_command(velocity, limits, self.control_period_s)
+        self.rotating_to_goal = True
+        return turning_command(turn_rad, velocity, limits, self.control_period_s)
+
     def _cut_plan(
         self, spec: GridSpec, pose: Pose2D, local_from_plan: Pose2D
     ) -> NDArray[np.float64]:
@@ -86,35 +98,74 @@ class PlanFollower:
         return plan
 
 
+def is_stopped(velocity: Twist2D, params: GoalLimits) -> bool:
+    """Tell whether a velocity counts as stopped."""
+    return (
+        abs(velocity.vyaw_radps) <= params.rot_stopped_velocity_radps
+        and abs(velocity.vx_mps) <= params.trans_stopped_velocity_mps
+        and abs(velocity.vy_mps) <= params.trans_stopped_velocity_mps
+    )
+
+
+def stopping_command(velocity: Twist2D, params: GoalLimits, control_period_s: float) -> Twist2D:
+    """Return the slowest command that the acceleration limits allow in one control period."""
+    return Twist2D(
+        _slowed(velocity.vx_mps, params.acc_lim_x_mps2 * control_period_s),
+        _slowed(velocity.vy_mps, params.acc_lim_y_mps2 * control_period_s),
+        _slowed(velocity.vyaw_radps, params.acc_lim_theta_radps2 * control_period_s),
+    )
+
+
+def turning_command(
+    turn_rad: float, velocity: Twist2D, params: GoalLimits, control_period_s: float
+) -> Twist2D:
+    """Return a turn in place that stops at the goal's heading.
+
+    Limits, the strongest first: with ``predict_goal_turn``, no farther than the turn in one control
+    period; at least ``min_in_place_vel_theta`` and at most ``max_rotational_vel``; no faster than
+    can be braked, sqrt(2 * acceleration * turn); within the acceleration limit of the current
+    speed. Without the first, at 1 Hz and 1 rad/s, upstream oversteps the goal's heading for ever.
+    """
+    acceleration = params.acc_lim_theta_radps2
+    current, change = abs(velocity.vyaw_radps), acceleration * control_period_s
+    speed = _in_place_speed(abs(turn_rad), params)
+    speed = min(max(speed, current - change), current + change)
+    speed = min(speed, math.sqrt(2.0 * acceleration * abs(turn_rad)))
+    speed = _in_place_speed(speed, params)
+    if params.predict_goal_turn:
+        speed = min(speed, abs(turn_rad) / control_period_s)
+    return Twist2D(vyaw_radps=speed if turn_rad > 0.0 else -speed)
+
+
+def _in_place_speed(speed_radps: float, params: GoalLimits) -> float:
+    return min(
+        params.max_rotational_vel_radps, max(params.min_in_place_vel_theta_radps, speed_radps)
+    )
+
+
+def _slowed(velocity: float, max_change: float) -> float:
+    return math.copysign(max(0.0, abs(velocity) - max_change), velocity)
+
+
 def plan_in_window(
     plan: NDArray[np.float64], spec: GridSpec, pose: Pose2D, local_from_plan: Pose2D
 ) -> NDArray[np.float64]:
-    """Return a plan's first stretch near the robot.
+    """Return a plan's first stretch near the robot, float64[m, 3], in the local costmap's frame.
 
-    Near is half of the costmap's longer side. The stretch begins with the first near pose and
-    ends with the first far one after it.
-
-    Args:
-        plan: float64[n, 3], rows x, y, yaw in its own frame.
-        spec: Grid of the local costmap.
-        pose: Pose of the robot in the local costmap's frame.
-        local_from_plan: Pose of the plan's frame in the local costmap's frame.
-
-    Returns:
-        float64[m, 3], in the local costmap's frame; empty if no pose is near.
+    Near is half of the costmap's longer side. The stretch begins with the first near pose and ends
+    with the first far one after it; it is empty if no pose is near.
     """
     radius_m = float(max(spec.size_x, spec.size_y) * spec.resolution_m / 2.0)
     robot = pose.relative_to(local_from_plan)
-    yaw_rad = float(local_from_plan.yaw_rad)
-    return stretch_near(
-        plan,
-        float(robot.x_m),
-        float(robot.y_m),
-        radius_m,
-        (float(local_from_plan.x_m), float(local_from_plan.y_m)),
-        (math.cos(yaw_rad), math.sin(yaw_rad)),
-        yaw_rad,
-    )
+    at, yaw_rad = (float(robot.x_m), float(robot.y_m)), float(local_from_plan.yaw_rad)
+    frame = float(local_from_plan.x_m), float(local_from_plan.y_m), yaw_rad
+    rotation = math.cos(yaw_rad), math.sin(yaw_rad)
+    return _stretch_near(plan, *at, radius_m, frame, rotation)
+
+
+def count_passed(plan: NDArray[np.float64], pose: Pose2D) -> int:
+    """Count the poses at a plan's beginning that are 1 m or more away from the robot."""
+    return _count_farther(plan, float(pose.x_m), float(pose.y_m), _PASSED_BEYOND_M)
 
 
 def plan_end(plan: NDArray[np.float64], local_from_plan: Pose2D) -> Pose2D:
@@ -122,6 +173,42 @@ def plan_end(plan: NDArray[np.float64], local_from_plan: Pose2D) -> Pose2D:
     return Pose2D(*local_from_plan.transform_poses(plan[-1:])[0].tolist())
 
 
-def count_passed(plan: NDArray[np.float64], pose: Pose2D) -> int:
-    """Count the poses at a plan's beginning that are 1 m or more away from the robot."""
-    return count_farther(plan, float(pose.x_m), float(pose.y_m), _PASSED_BEYOND_M)
+@njit(cache=True, nogil=True)
+def _stretch_near(
+    plan: NDArray[np.float64],
+    x: float,
+    y: float,
+    radius_m: float,
+    a_from_plan: Triple,
+    rotation: Tuple[float, float],
+) -> NDArray[np.float64]:
+    """Return the first stretch near a point of the plan's frame, in another frame a."""
+    first = 0
+    while first < plan.shape[0] and not _distance2(plan, first, x, y) <= radius_m * radius_m:
+        first += 1
+    end = first
+    while end < plan.shape[0] and _distance2(plan, end, x, y) <= radius_m * radius_m:
+        end += 1
+    end = min(end + 1, plan.shape[0])
+    cos, sin = rotation
+    stretch = np.empty((end - first, 3))
+    for k in range(end - first):
+        from_x, from_y = plan[first + k, 0], plan[first + k, 1]
+        stretch[k, 0] = cos * from_x - sin * from_y + a_from_plan[0]
+        stretch[k, 1] = sin * from_x + cos * from_y + a_from_plan[1]
+        stretch[k, 2] = plan[first + k, 2] + a_from_plan[2]
+    return stretch
+
+
+@njit(cache=True, nogil=True)
+def _count_farther(plan: NDArray[np.float64], x: float, y: float, square_m2: float) -> int:
+    count = 0
+    while count < plan.shape[0] and not _distance2(plan, count, x, y) < square_m2:
+        count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _distance2(plan: NDArray[np.float64], k: int, x: float, y: float) -> float:
+    dx, dy = x - plan[k, 0], y - plan[k, 1]
+    return dx * dx + dy * dy

@@ -36,13 +36,11 @@ from quad_nav.control import rollout_kernel as kernel
 from quad_nav.control.map_grid import cost_cloud, distance_grids
 from quad_nav.control.sample_motion import RolloutParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
-from quad_nav.control.velocity_search_kernel import SampleRules, VelocityWindow, search
 from quad_nav.costmap import collision
-from quad_nav.costmap.cost_grid_kernel import CostmapView
+from quad_nav.costmap.collision import Triple
+from quad_nav.costmap.cost_grid import costmap_view
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, LETHAL, GridSpec
-
-Triple = Tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -70,8 +68,7 @@ class Rollout:
         goal_x_m: End of the plan in the costmap.
         goal_y_m: End of the plan in the costmap.
         grids: Distances to plan and local goal.
-        inputs: What the kernels score against.
-        kernel_params: Parameters as the kernels take them.
+        inputs: What the kernels start with and score against.
     """
 
     def __init__(
@@ -90,8 +87,11 @@ class Rollout:
         costmap = costmap_view(spec, costs)
         plan = np.ascontiguousarray(plan)
         self.goal_x_m, self.goal_y_m = plan[-1, :2].tolist()
-        self.grids = distance_grids(costmap, plan, footprint, self.pose)
+        self.grids = distance_grids(costmap, plan, footprint, _triple(self.pose))
         self.inputs = kernel.RolloutInputs(
+            _kernel_params(params, spec.resolution_m),
+            _triple(self.pose),
+            self.velocity,
             costmap,
             collision.highest_near(
                 costmap,
@@ -106,7 +106,6 @@ class Rollout:
             self.grids.goal,
             plan,
         )
-        self.kernel_params = _kernel_params(params, spec.resolution_m)
 
     def score(
         self, samples: NDArray[np.float64]
@@ -116,45 +115,27 @@ class Rollout:
         Returns:
             Costs, float64[n], and last poses, float64[n, 3].
         """
-        return kernel.score(self.inputs, self.kernel_params, *self._start, samples)
-
-    def cheapest(self, samples: NDArray[np.float64]) -> Optional[Tuple[int, float]]:
-        """Return index and cost of the cheapest legal sample, the first of equals, or None."""
-        k, cost = kernel.cheapest(self.inputs, self.kernel_params, *self._start, samples)
-        return (k, cost) if k >= 0 else None
-
-    def search(self, window: VelocityWindow, rules: SampleRules) -> Tuple[Triple, float, float]:
-        """Return the best forward sample or turn in place; see ``velocity_search.search``."""
-        return search(self.inputs, self.kernel_params, *self._start, window, rules)
-
-    @property
-    def _start(self) -> Tuple[Triple, Triple]:
-        return _triple(self.pose), self.velocity
+        return kernel.score(self.inputs, samples)
 
     def trajectory(self, sample: Triple) -> Trajectory:
         """Simulate a sample from the robot's state."""
-        cost, points = kernel.trajectory(self.inputs, self.kernel_params, *self._start, sample)
+        cost, points = kernel.trajectory(self.inputs, sample)
         return Trajectory(sample, cost, points)
 
     def is_valid(self, pose: Pose2D, velocity: Twist2D, command: Twist2D) -> bool:
         """Tell whether a command from a state, in double precision, is legal."""
-        cost, _ = kernel.trajectory(
-            self.inputs,
-            self.kernel_params,
-            _triple(pose),
-            _twist_triple(velocity),
-            _twist_triple(command),
-        )
+        inputs = self.inputs._replace(pose=_triple(pose), velocity=_twist_triple(velocity))
+        cost, _ = kernel.trajectory(inputs, _twist_triple(command))
         return bool(cost >= 0.0)
 
     def is_free(self, pose: Pose2D) -> bool:
         """Tell whether no obstacle is under or inside of the footprint at a pose."""
         costmap, footprint = self.inputs.costmap, self.inputs.footprint
-        if collision.footprint_cost(costmap, footprint, *_triple(pose)) < 0.0:
+        if collision.footprint_cost(costmap, footprint, _triple(pose)) < 0.0:
             return False
         inside = np.zeros(costmap.costs.shape, dtype=np.bool_)
         if len(footprint) > 2:
-            collision.mark_footprint(costmap, footprint, *_triple(pose), inside)
+            collision.mark_footprint(costmap, footprint, _triple(pose), inside)
         return not bool((costmap.costs[inside] >= LETHAL).any())
 
     def goal_distance_at(self, x_m: float, y_m: float) -> Optional[int]:
@@ -169,36 +150,9 @@ class Rollout:
         """
         costs, path = self.inputs.costmap.costs, self.grids.path
         usable = (path < costs.size) & (costs < INSCRIBED) & ~self.grids.within_robot
-        return cost_cloud(
-            self.spec,
-            costs,
-            path,
-            self.grids.goal,
-            usable,
-            self.kernel_params.path_scale,
-            self.kernel_params.goal_scale,
-            self.kernel_params.occupancy_scale,
-        )
-
-
-def costmap_view(spec: GridSpec, costs: NDArray[np.uint8]) -> CostmapView:
-    """Return a costmap, uint8[H, W] on ``spec``, as the kernels take it."""
-    return CostmapView(
-        costs=np.ascontiguousarray(costs),
-        origin_x_m=float(spec.origin_x_m),
-        origin_y_m=float(spec.origin_y_m),
-        resolution_m=float(spec.resolution_m),
-    )
-
-
-def footprint_cost(
-    spec: GridSpec, costs: NDArray[np.uint8], footprint: NDArray[np.float64], pose: Pose2D
-) -> float:
-    """Return the highest cost under the outline of a footprint, float64[n, 2], at a pose.
-
-    It is -1 on a lethal cell, -2 on an unknown one and -3 off the map.
-    """
-    return collision.footprint_cost(costmap_view(spec, costs), footprint, *_triple(pose))
+        params = self.inputs.params
+        scales = params.path_scale, params.goal_scale, params.occupancy_scale
+        return cost_cloud(self.inputs.costmap, path, self.grids.goal, usable, scales)
 
 
 def _travel_m(params: TrajectoryPlannerParams, velocity: Triple) -> float:

@@ -14,13 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.control.lanes import OFF_MAP, UNCERTAIN
-from quad_nav.control.sample_motion import (
-    RolloutParams,
-    last_cells,
-    longest,
-    step_count,
-    travel,
-)
+from quad_nav.control.sample_motion import RolloutParams, last_cells, longest, step_count, travel
 from quad_nav.costmap.collision import COLLIDES, Triple, footprint_cost, line_cost
 from quad_nav.costmap.cost_grid_kernel import CostmapView, cell_of
 from quad_nav.files.kernel_cache import njit
@@ -32,7 +26,11 @@ _HEADING_SCALE = 0.3
 
 
 class RolloutInputs(NamedTuple):
-    """Costmap, footprint and plan that trajectories are scored against."""
+    """State of the robot that trajectories begin with, and what they are scored against."""
+
+    params: RolloutParams
+    pose: Triple
+    velocity: Triple
 
     costmap: CostmapView
     highest_near: NDArray[np.uint8]  # [H, W], no less than the highest cost under the footprint
@@ -45,29 +43,18 @@ class RolloutInputs(NamedTuple):
 @njit(cache=True, nogil=True)
 def simulate(
     inputs: RolloutInputs,
-    params: RolloutParams,
-    pose: Triple,
-    velocity: Triple,
     sample: NDArray[np.float64],
     points: NDArray[np.float64],
     with_footprint: bool = True,
 ) -> Tuple[float, int]:
-    """Simulate and score a sample.
-
-    Args:
-        inputs: Costmap, footprint and plan.
-        params: Parameters.
-        pose: Pose of the robot.
-        velocity: Velocity of the robot.
-        sample: float64[3], vx, vy, vtheta.
-        points: float64[k, 3], filled with poses.
-        with_footprint: False to leave out the costs under the footprint.
+    """Simulate and score a sample, float64[3]; fill its poses, float64[k, 3].
 
     Returns:
         The cost, COLLIDES (also off the map) or OUT_OF_REACH, and the number of poses before one
-        that fails.
+        that fails. Without ``with_footprint`` the costs under the footprint are left out.
     """
-    steps = travel(params, pose, velocity, sample, points)
+    params = inputs.params
+    steps = travel(params, inputs.pose, inputs.velocity, sample, points)
     dt = params.sim_time_s / steps
     path_distance, goal_distance, occupancy, heading, time = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(steps):
@@ -76,7 +63,7 @@ def simulate(
         if cell_x < 0 or cell_y < 0:
             return COLLIDES, k
         if with_footprint:
-            occupancy = _occupancy(inputs, x, y, theta, cell_x, cell_y, occupancy)
+            occupancy = _occupancy(inputs, (x, y, theta), cell_x, cell_y, occupancy)
             if occupancy < 0.0:
                 return COLLIDES, k
         if params.simple_attractor:
@@ -105,18 +92,12 @@ def simulate(
 
 @njit(cache=True, nogil=True)
 def _occupancy(
-    inputs: RolloutInputs,
-    x: float,
-    y: float,
-    theta: float,
-    cell_x: int,
-    cell_y: int,
-    occupancy: float,
+    inputs: RolloutInputs, pose: Triple, cell_x: int, cell_y: int, occupancy: float
 ) -> float:
     """Return the higher of an occupancy and that of a pose, COLLIDES where the footprint does."""
     if inputs.highest_near[cell_y, cell_x] <= occupancy:
         return occupancy  # the footprint changes nothing
-    cost = footprint_cost(inputs.costmap, inputs.footprint, x, y, theta)
+    cost = footprint_cost(inputs.costmap, inputs.footprint, pose)
     if cost < 0.0:
         return COLLIDES
     return max(occupancy, cost, float(inputs.costmap.costs[cell_y, cell_x]))
@@ -147,51 +128,35 @@ def _heading_difference(
 
 
 @njit(cache=True, nogil=True)
-def trajectory(
-    inputs: RolloutInputs,
-    params: RolloutParams,
-    pose: Triple,
-    velocity: Triple,
-    sample: Triple,
-) -> Tuple[float, NDArray[np.float64]]:
+def trajectory(inputs: RolloutInputs, sample: Triple) -> Tuple[float, NDArray[np.float64]]:
     """Return the cost of a sample and its poses, float64[k, 3]; see ``simulate``."""
     row = np.array(sample)
-    points = np.empty((step_count(params, row[0], row[1], row[2]), 3))
-    cost, count = simulate(inputs, params, pose, velocity, row, points)
+    points = np.empty((step_count(inputs.params, row[0], row[1], row[2]), 3))
+    cost, count = simulate(inputs, row, points)
     return cost, points[:count]
 
 
 @njit(cache=True, nogil=True)
 def score(
-    inputs: RolloutInputs,
-    params: RolloutParams,
-    pose: Triple,
-    velocity: Triple,
-    samples: NDArray[np.float64],
+    inputs: RolloutInputs, samples: NDArray[np.float64]
 ) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Score samples, float64[n, 3].
 
     Returns:
         Costs, float64[n], and last poses, float64[n, 3], nan where the first pose fails.
     """
-    points = np.empty((longest(params, samples), 3))
+    points = np.empty((longest(inputs.params, samples), 3))
     costs = np.empty(samples.shape[0])
     ends = np.full((samples.shape[0], 3), np.nan)
     for k in range(samples.shape[0]):
-        costs[k], count = simulate(inputs, params, pose, velocity, samples[k], points)
+        costs[k], count = simulate(inputs, samples[k], points)
         if count > 0:
             ends[k] = points[count - 1]
     return costs, ends
 
 
 @njit(cache=True, nogil=True)
-def cheapest(
-    inputs: RolloutInputs,
-    params: RolloutParams,
-    pose: Triple,
-    velocity: Triple,
-    samples: NDArray[np.float64],
-) -> Tuple[int, float]:
+def cheapest(inputs: RolloutInputs, samples: NDArray[np.float64]) -> Tuple[int, float]:
     """Find the legal sample of lowest cost, the first of equals.
 
     Samples, float64[n, 3], are tried in the order of their least costs, until that is more than
@@ -200,19 +165,17 @@ def cheapest(
     Returns:
         Index and cost; the index is -1 if no sample is legal.
     """
-    points = np.empty((longest(params, samples), 3))
-    at_start = occupancy_at(inputs, pose)
+    points = np.empty((longest(inputs.params, samples), 3))
+    at_start = occupancy_at_start(inputs)
     best, best_cost = -1, np.inf
     if at_start < 0.0:
         return best, best_cost
-    bounds = least_costs(inputs, params, pose, velocity, samples, at_start, points)
+    bounds = least_costs(inputs, samples, at_start, points)
     for _ in range(samples.shape[0]):
         k = int(np.argmin(bounds))
         if bounds[k] == np.inf or bounds[k] > best_cost:
             break
-        cost = cost_up_to(inputs, params, pose, velocity, samples[k], at_start, best_cost, points)[
-            0
-        ]
+        cost, _ = cost_up_to(inputs, samples[k], at_start, best_cost, points)
         bounds[k] = np.inf
         if 0.0 <= cost < best_cost or (cost == best_cost and k < best):
             best, best_cost = k, cost
@@ -220,13 +183,12 @@ def cheapest(
 
 
 @njit(cache=True, nogil=True)
-def occupancy_at(inputs: RolloutInputs, pose: Triple) -> float:
-    """Return the occupancy at a pose, COLLIDES where the footprint does or off the map."""
-    x, y, theta = pose
-    cell_x, cell_y = cell_of(inputs.costmap, x, y)
+def occupancy_at_start(inputs: RolloutInputs) -> float:
+    """Return the occupancy at the pose, COLLIDES where the footprint does or off the map."""
+    cell_x, cell_y = cell_of(inputs.costmap, inputs.pose[0], inputs.pose[1])
     if cell_x < 0 or cell_y < 0:
         return COLLIDES
-    return _occupancy(inputs, x, y, theta, cell_x, cell_y, 0.0)
+    return _occupancy(inputs, inputs.pose, cell_x, cell_y, 0.0)
 
 
 @njit(cache=True, nogil=True)
@@ -243,59 +205,45 @@ def _ends_decide(params: RolloutParams) -> bool:
 @njit(cache=True, nogil=True)
 def least_costs(
     inputs: RolloutInputs,
-    params: RolloutParams,
-    pose: Triple,
-    velocity: Triple,
     samples: NDArray[np.float64],
     at_start: float,
     points: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the least that samples cost if they are legal, infinite for some that are not.
+    """Return the least that samples, float64[n, 3], cost if legal, inf for some that are not.
 
     That is the cost with the occupancy of the last cell alone, or without the footprint if other
-    poses count as well; -inf if the footprint makes a sample cheaper.
-
-    Args:
-        inputs: Costmap, footprint and plan.
-        params: Parameters.
-        pose: Pose of the robot.
-        velocity: Velocity of the robot.
-        samples: float64[n, 3].
-        at_start: Occupancy at the pose.
-        points: float64[k, 3], overwritten.
-
-    Returns:
-        float64[n].
+    poses count as well; -inf if the footprint makes a sample cheaper. ``points``, float64[k, 3], is
+    overwritten.
     """
+    params = inputs.params
     bounds = np.full(samples.shape[0], -np.inf)
     if not params.occupancy_scale >= 0.0:
         return bounds
     if not _ends_decide(params):
         for k in range(samples.shape[0]):
-            cost, _ = simulate(inputs, params, pose, velocity, samples[k], points, False)
+            cost, _ = simulate(inputs, samples[k], points, False)
             bounds[k] = np.inf if cost == COLLIDES or cost == OUT_OF_REACH else cost
         return bounds
     size_x = inputs.costmap.costs.shape[1]
-    cells = last_cells(params, inputs.costmap, pose, velocity, samples)
+    cells = last_cells(params, inputs.costmap, inputs.pose, inputs.velocity, samples)
     for k in range(samples.shape[0]):
         cell = cells[k]
         if cell == UNCERTAIN:
-            steps = travel(params, pose, velocity, samples[k], points)
+            steps = travel(params, inputs.pose, inputs.velocity, samples[k], points)
             x, y = cell_of(inputs.costmap, points[steps - 1, 0], points[steps - 1, 1])
             cell = y * size_x + x if x >= 0 and y >= 0 else OFF_MAP
         bounds[k] = np.inf
         if cell != OFF_MAP:
             y, x = cell // size_x, cell % size_x
             occupancy = max(at_start, float(inputs.costmap.costs[y, x]))
-            bounds[k] = _cost_of_end(inputs, params, x, y, occupancy)
+            bounds[k] = _cost_of_end(inputs, x, y, occupancy)
     return bounds
 
 
 @njit(cache=True, nogil=True)
-def _cost_of_end(
-    inputs: RolloutInputs, params: RolloutParams, cell_x: int, cell_y: int, occupancy: float
-) -> float:
+def _cost_of_end(inputs: RolloutInputs, cell_x: int, cell_y: int, occupancy: float) -> float:
     """Return the cost of trajectories that end in a cell, infinite out of reach."""
+    params = inputs.params
     path_distance = float(inputs.path_distance[cell_y, cell_x])
     goal_distance = float(inputs.goal_distance[cell_y, cell_x])
     if max(path_distance, goal_distance) >= inputs.path_distance.size:
@@ -310,9 +258,6 @@ def _cost_of_end(
 @njit(cache=True, nogil=True)
 def cost_up_to(
     inputs: RolloutInputs,
-    params: RolloutParams,
-    pose: Triple,
-    velocity: Triple,
     sample: NDArray[np.float64],
     at_start: float,
     limit: float,
@@ -320,24 +265,12 @@ def cost_up_to(
 ) -> Tuple[float, int]:
     """Return the cost of a sample as ``simulate`` does, or inf if it is more than a limit.
 
-    Poses are examined from the last one on, where most trajectories fail that do.
-
-    Args:
-        inputs: Costmap, footprint and plan.
-        params: Parameters.
-        pose: Pose of the robot.
-        velocity: Velocity of the robot.
-        sample: float64[3], vx, vy, vtheta.
-        at_start: Occupancy at the pose, 0 or more.
-        limit: Highest cost of interest.
-        points: float64[k, 3], filled with poses.
-
-    Returns:
-        The cost, negative or infinite if it is illegal, and the number of poses.
+    Poses are examined from the last one on, where most trajectories fail that do. The occupancy at
+    the robot's pose is known, 0 or more.
     """
-    if not _ends_decide(params):
-        return simulate(inputs, params, pose, velocity, sample, points)
-    steps = travel(params, pose, velocity, sample, points)
+    if not _ends_decide(inputs.params):
+        return simulate(inputs, sample, points)
+    steps = travel(inputs.params, inputs.pose, inputs.velocity, sample, points)
     occupancy, last_x, last_y = at_start, 0, 0
     for k in range(steps - 1, -1, -1):
         x, y, theta = points[k]
@@ -351,9 +284,9 @@ def cost_up_to(
             return np.inf, steps
         known = occupancy
         if k > 0:
-            occupancy = _occupancy(inputs, x, y, theta, cell_x, cell_y, occupancy)
+            occupancy = _occupancy(inputs, (x, y, theta), cell_x, cell_y, occupancy)
         if occupancy == known:
             continue
-        if occupancy < 0.0 or _cost_of_end(inputs, params, last_x, last_y, occupancy) > limit:
+        if occupancy < 0.0 or _cost_of_end(inputs, last_x, last_y, occupancy) > limit:
             return np.inf, steps
-    return _cost_of_end(inputs, params, last_x, last_y, occupancy), steps
+    return _cost_of_end(inputs, last_x, last_y, occupancy), steps

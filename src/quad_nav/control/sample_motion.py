@@ -83,17 +83,10 @@ def travel(
     sample: NDArray[np.float64],
     points: NDArray[np.float64],
 ) -> int:
-    """Simulate a sample from the robot's pose and velocity.
-
-    Args:
-        params: Parameters.
-        pose: Pose of the robot.
-        velocity: Velocity of the robot.
-        sample: float64[3], vx, vy, vtheta.
-        points: float64[k, 3], filled with poses.
+    """Simulate a sample, float64[3], from the robot's pose and velocity.
 
     Returns:
-        The number of poses.
+        The number of poses, which fill float64[k, 3].
     """
     steps = step_count(params, sample[0], sample[1], sample[2])
     dt = params.sim_time_s / steps
@@ -132,12 +125,7 @@ def last_cells(
 ) -> NDArray[np.int64]:
     """Find the cells of the samples' last poses without the poses before.
 
-    Args:
-        params: Parameters, with acceleration limits of 0 or more.
-        costmap: The costmap.
-        pose: Pose of the robot.
-        velocity: Velocity of the robot.
-        samples: float64[n, 3], rows vx, vy, vtheta.
+    Acceleration limits are 0 or more, samples float64[n, 3].
 
     Returns:
         int64[n], flat cells; OFF_MAP off the map, UNCERTAIN within rounding of a cell's border.

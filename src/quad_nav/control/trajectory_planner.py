@@ -3,7 +3,7 @@
 Each call cuts the global plan to the local costmap, measures distances to it (``map_grid``),
 simulates velocities (``rollout``) and takes the best one (``velocity_search``). Within
 ``xy_goal_tolerance_m`` of the plan's last pose in the local costmap it stops and turns in place
-instead (``goal``).
+instead (``plan_follower``).
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.control.controller import IDENTITY, Control
-from quad_nav.control.goal import is_stopped, stopping_command, turning_command
 from quad_nav.control.oscillation import Oscillation
 from quad_nav.control.plan_follower import NO_POSES, PlanFollower
 from quad_nav.control.rollout import Rollout, Trajectory
@@ -100,11 +99,7 @@ class TrajectoryPlanner(PlanFollower):
             self._goal_reached = True
             return Twist2D()
         self._search(spec, costs, pose, velocity)  # updates the oscillation state
-        if not self.rotating_to_goal and not is_stopped(velocity, self.params):
-            command = stopping_command(velocity, self.params, self.control_period_s)
-        else:
-            self.rotating_to_goal = True
-            command = turning_command(turn_rad, velocity, self.params, self.control_period_s)
+        command = self._stop_or_turn(turn_rad, velocity, self.params)
         assert self.rollout is not None
         if not self.rollout.is_valid(pose, velocity, command):
             raise NoValidTrajectory(
@@ -115,15 +110,8 @@ class TrajectoryPlanner(PlanFollower):
     def _search(
         self, spec: GridSpec, costs: NDArray[np.uint8], pose: Pose2D, velocity: Twist2D
     ) -> Trajectory:
-        self.rollout = Rollout(
-            self.params,
-            spec,
-            costs,
-            self.footprint,
-            self.local_global_plan,
-            pose,
-            velocity,
-        )
+        plan = self.local_global_plan
+        self.rollout = Rollout(self.params, spec, costs, self.footprint, plan, pose, velocity)
         self.best = choose_trajectory(
             self.rollout, self.params, self.oscillation, self.control_period_s
         )

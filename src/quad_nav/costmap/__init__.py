@@ -6,6 +6,6 @@ Reading order: ``cost_grid`` (grids, windows, bounds), ``layer`` (the interface 
 ``layered`` (the costmap), ``observation`` and ``obstacle`` (what sensors see), ``voxel``,
 ``static``, ``inflation``, ``peer_layer``, ``projection`` (scan to points), ``scan_validator``
 and ``scan_intake`` (how a scan reaches the layers). Their loops are in ``cost_grid_kernel`` and
-``collision`` (cells and costs under a footprint), ``projection_kernel``, ``observation_kernel``,
-``raytrace`` with ``obstructed_cells``, ``voxel_kernel`` and ``inflation_kernel``.
+``collision`` (cells and costs under a footprint), ``observation_kernel``, ``raytrace`` with
+``obstructed_cells``, and ``voxel_kernel``.
 """

@@ -8,7 +8,7 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.costmap.cost_grid_kernel import CostmapView, cell_of, fill_convex_polygon
+from quad_nav.costmap.cost_grid_kernel import CostmapView, cell_of, draw_line, fill_convex_polygon
 from quad_nav.files.kernel_cache import njit
 from quad_nav.grid import INSCRIBED, LETHAL, UNKNOWN
 
@@ -20,34 +20,21 @@ OFF_THE_MAP = -3.0
 
 
 @njit(cache=True, nogil=True)
-def _bresenham(x0: int, y0: int, x1: int, y1: int) -> Tuple[int, int, int, int, int, int]:
-    """Return a line's number of steps, number of side steps, step (x, y), side step (x, y)."""
-    dx, dy = abs(x1 - x0), abs(y1 - y0)
-    step_x = 1 if x1 >= x0 else -1
-    step_y = 1 if y1 >= y0 else -1
-    if dx >= dy:
-        return dx, dy, step_x, 0, 0, step_y
-    return dy, dx, 0, step_y, step_x, 0
-
-
-@njit(cache=True, nogil=True)
 def line_cost(
     costs: NDArray[np.uint8], x0: int, y0: int, x1: int, y1: int, forbidden_from: int
 ) -> float:
-    """Return the highest cost on a line of cells, ends included.
-
-    Args:
-        costs: uint8[H, W].
-        x0: Column of the first cell, inside the grid.
-        y0: Row of the first cell.
-        x1: Column of the last cell, inside the grid.
-        y1: Row of the last cell.
-        forbidden_from: Lowest cost that collides.
+    """Return the highest cost on a line of cells, both ends on the grid and included.
 
     Returns:
-        The cost, or COLLIDES or IN_UNKNOWN at the first forbidden or unknown cell.
+        The cost, or COLLIDES or IN_UNKNOWN at the first cell of at least ``forbidden_from``, or
+        unknown.
     """
-    length, side, step_x, step_y, side_x, side_y = _bresenham(x0, y0, x1, y1)
+    length, side = abs(x1 - x0), abs(y1 - y0)
+    step_x, step_y = 1 if x1 >= x0 else -1, 0
+    side_x, side_y = 0, 1 if y1 >= y0 else -1
+    if side > length:
+        length, side = side, length
+        step_x, step_y, side_x, side_y = side_x, side_y, step_x, step_y
     x, y, error = x0, y0, length // 2
     highest = 0
     for _ in range(length + 1):
@@ -69,30 +56,25 @@ def line_cost(
 
 
 @njit(cache=True, nogil=True)
-def footprint_cost(
-    costmap: CostmapView, footprint: NDArray[np.float64], x: float, y: float, theta: float
-) -> float:
+def footprint_cost(costmap: CostmapView, footprint: NDArray[np.float64], pose: Triple) -> float:
     """Return the highest cost under a footprint's outline at a pose.
 
     Args:
         costmap: The costmap.
         footprint: float64[n, 2], metres in the robot's frame. Fewer than three points stand
             for a circle: only the centre's cell counts, and inscribed cost collides.
-        x: x of the robot in the costmap's frame, metres.
-        y: y of the robot.
-        theta: Heading of the robot, radians.
+        pose: x and y of the robot, metres, and its heading, radians, in the costmap's frame.
 
     Returns:
-        The cost; COLLIDES if the outline meets a lethal cell, IN_UNKNOWN if it meets an
-        unknown one, OFF_THE_MAP if it leaves the map.
+        The cost, COLLIDES or IN_UNKNOWN at the first such cell, or OFF_THE_MAP.
     """
-    cell_x, cell_y = cell_of(costmap, x, y)
+    cell_x, cell_y = cell_of(costmap, pose[0], pose[1])
     if cell_x < 0 or cell_y < 0:
         return OFF_THE_MAP
     if footprint.shape[0] < 3:
         return line_cost(costmap.costs, cell_x, cell_y, cell_x, cell_y, INSCRIBED)
-    cos_theta, sin_theta = math.cos(theta), math.sin(theta)
-    first_x, first_y = _vertex_cell(costmap, footprint, 0, x, y, cos_theta, sin_theta)
+    rotation = math.cos(pose[2]), math.sin(pose[2])
+    first_x, first_y = _vertex_cell(costmap, footprint, 0, pose, rotation)
     if first_x < 0 or first_y < 0:
         return OFF_THE_MAP
     from_x, from_y = first_x, first_y
@@ -100,7 +82,7 @@ def footprint_cost(
     for k in range(1, footprint.shape[0] + 1):
         to_x, to_y = first_x, first_y
         if k < footprint.shape[0]:
-            to_x, to_y = _vertex_cell(costmap, footprint, k, x, y, cos_theta, sin_theta)
+            to_x, to_y = _vertex_cell(costmap, footprint, k, pose, rotation)
             if to_x < 0 or to_y < 0:
                 return OFF_THE_MAP
         cost = line_cost(costmap.costs, from_x, from_y, to_x, to_y, LETHAL)
@@ -116,17 +98,11 @@ def _vertex_cell(
     costmap: CostmapView,
     footprint: NDArray[np.float64],
     k: int,
-    x: float,
-    y: float,
-    cos_theta: float,
-    sin_theta: float,
+    pose: Triple,
+    rotation: Tuple[float, float],
 ) -> Tuple[int, int]:
-    vertex_x, vertex_y = footprint[k, 0], footprint[k, 1]
-    return cell_of(
-        costmap,
-        x + (vertex_x * cos_theta - vertex_y * sin_theta),
-        y + (vertex_x * sin_theta + vertex_y * cos_theta),
-    )
+    x, y, (cos, sin) = footprint[k, 0], footprint[k, 1], rotation
+    return cell_of(costmap, pose[0] + (x * cos - y * sin), pose[1] + (x * sin + y * cos))
 
 
 @njit(cache=True, nogil=True)
@@ -140,19 +116,12 @@ def highest_near(
 ) -> NDArray[np.uint8]:
     """Return the highest cost in a square around each cell that the robot may get to.
 
-    The square holds a footprint; where the result is low its outline need not be drawn. It is
-    built up from maxima over two, four, ... cells.
-
-    Args:
-        costmap: The costmap; cells off the map count as UNKNOWN.
-        footprint: float64[n, 2], metres in the robot's frame.
-        scale: Factor of its size.
-        x: x of the robot in the costmap's frame, metres.
-        y: y of the robot.
-        travel_m: Distance that the robot may travel.
+    The square holds a footprint, float64[n, 2], times a scale; where the result is low its outline
+    need not be drawn. It is built up from maxima over two, four, ... cells. Cells off the map count
+    as UNKNOWN.
 
     Returns:
-        uint8[H, W]; UNKNOWN farther away than that.
+        uint8[H, W]; UNKNOWN farther than ``travel_m`` from the robot at (x, y).
     """
     size_y, size_x = costmap.costs.shape
     highest = np.full((size_y, size_x), UNKNOWN, np.uint8)
@@ -203,48 +172,19 @@ def _cells_within(
 
 @njit(cache=True, nogil=True)
 def mark_footprint(
-    costmap: CostmapView,
-    footprint: NDArray[np.float64],
-    x: float,
-    y: float,
-    theta: float,
-    mask: NDArray[np.bool_],
+    costmap: CostmapView, footprint: NDArray[np.float64], pose: Triple, mask: NDArray[np.bool_]
 ) -> None:
-    """Set the cells inside a footprint.
+    """Set the cells, bool[H, W], inside a footprint; the arguments are those of ``footprint_cost``.
 
     Where a vertex is off the map only the outline before it is set.
-
-    Args:
-        costmap: The costmap.
-        footprint: float64[n, 2], metres in the robot's frame.
-        x: x of the robot in the costmap's frame, metres.
-        y: y of the robot.
-        theta: Heading of the robot, radians.
-        mask: bool[H, W], changed in place.
     """
-    cos_theta, sin_theta = math.cos(theta), math.sin(theta)
+    rotation = math.cos(pose[2]), math.sin(pose[2])
     vertices = np.empty((footprint.shape[0], 2), np.int64)
     for k in range(footprint.shape[0]):
-        vertices[k] = _vertex_cell(costmap, footprint, k, x, y, cos_theta, sin_theta)
+        vertices[k] = _vertex_cell(costmap, footprint, k, pose, rotation)
         if vertices[k, 0] < 0 or vertices[k, 1] < 0:
             for j in range(k - 1):
-                _mark_line(
-                    mask, vertices[j, 0], vertices[j, 1], vertices[j + 1, 0], vertices[j + 1, 1]
-                )
+                (x0, y0), (x1, y1) = vertices[j], vertices[j + 1]
+                draw_line(mask.reshape(-1), mask.shape[1], x0, y0, x1, y1, np.inf, True)
             return
     fill_convex_polygon(mask, vertices, True)
-
-
-@njit(cache=True, nogil=True)
-def _mark_line(mask: NDArray[np.bool_], x0: int, y0: int, x1: int, y1: int) -> None:
-    length, side, step_x, step_y, side_x, side_y = _bresenham(x0, y0, x1, y1)
-    x, y, error = x0, y0, length // 2
-    for _ in range(length + 1):
-        mask[y, x] = True
-        x += step_x
-        y += step_y
-        error += side
-        if error >= length:
-            error -= length
-            x += side_x
-            y += side_y

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Optional, Tuple
+from typing import NamedTuple, Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,6 +92,21 @@ _FLOAT_MAX = float(np.finfo(np.float32).max)
 EVERYWHERE = Bounds(-_FLOAT_MAX, -_FLOAT_MAX, _FLOAT_MAX, _FLOAT_MAX)
 
 
+class Square(NamedTuple):
+    """Square around a point, metres in the global frame."""
+
+    x_m: float
+    y_m: float
+    side_m: float
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """Corners, float64[4, 2]."""
+        half_m = 0.5 * self.side_m
+        around = [[-half_m, -half_m], [-half_m, half_m], [half_m, half_m], [half_m, -half_m]]
+        return np.array(around) + (self.x_m, self.y_m)
+
+
 class CostGrid:
     """Grid of costs that can move.
 
@@ -108,8 +123,7 @@ class CostGrid:
     @property
     def view(self) -> CostmapView:
         """The grid as kernels take it; ``costs`` is shared."""
-        spec = self.spec
-        return CostmapView(self.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m)
+        return costmap_view(self.spec, self.costs)
 
     def resize(self, spec: GridSpec) -> None:
         """Take another size, resolution or position, and forget all costs."""
@@ -153,40 +167,33 @@ class CostGrid:
         return Window(x0, min(spec.size_x, xn + 1), y0, min(spec.size_y, yn + 1))
 
     def fill_polygon(self, vertices: NDArray[np.float64], cost: int) -> bool:
-        """Set the cells of a convex polygon.
-
-        Args:
-            vertices: float64[n, 2], metres in the grid's frame.
-            cost: What the cells get.
+        """Set the cells of a convex polygon, float64[n, 2], metres in the grid's frame.
 
         Returns:
             False if a vertex is off the grid and nothing was set.
         """
         return bool(fill_polygon(self.view, vertices, cost))
 
-    def fill_square(self, centre_x_m: float, centre_y_m: float, size_m: float, cost: int) -> bool:
-        """Set the cells of a square; return False, and set nothing, if it leaves the grid."""
-        half_m = 0.5 * size_m
-        corners = np.array(
-            [[-half_m, -half_m], [-half_m, half_m], [half_m, half_m], [half_m, -half_m]]
-        )
-        return self.fill_polygon(corners + (centre_x_m, centre_y_m), cost)
-
-    def forget_area(
-        self, centre_x_m: float, centre_y_m: float, size_m: float, keep_inside: bool
-    ) -> None:
+    def forget_area(self, square: Square, keep_inside: bool) -> None:
         """Make all cells outside a square unknown (``keep_inside``), or those inside.
 
         The cells of the square's border count as outside.
         """
-        spec = self.spec
-        low_x = _cell(centre_x_m - size_m / 2, spec.origin_x_m, spec.resolution_m)
-        low_y = _cell(centre_y_m - size_m / 2, spec.origin_y_m, spec.resolution_m)
-        high_x = _cell(centre_x_m - size_m / 2 + size_m, spec.origin_x_m, spec.resolution_m)
-        high_y = _cell(centre_y_m - size_m / 2 + size_m, spec.origin_y_m, spec.resolution_m)
+        spec, side_m = self.spec, square.side_m
+        low_x_m, low_y_m = square.x_m - side_m / 2, square.y_m - side_m / 2
+        low_x = _cell(low_x_m, spec.origin_x_m, spec.resolution_m)
+        low_y = _cell(low_y_m, spec.origin_y_m, spec.resolution_m)
+        high_x = _cell(low_x_m + side_m, spec.origin_x_m, spec.resolution_m)
+        high_y = _cell(low_y_m + side_m, spec.origin_y_m, spec.resolution_m)
         inside = np.zeros(spec.shape, dtype=bool)
         inside[max(0, low_y + 1) : max(0, high_y), max(0, low_x + 1) : max(0, high_x)] = True
         self.costs[~inside if keep_inside else inside] = UNKNOWN
+
+
+def costmap_view(spec: GridSpec, costs: NDArray[np.uint8]) -> CostmapView:
+    """Return costs, uint8[H, W] on ``spec``, as kernels take them."""
+    origin_m = float(spec.origin_x_m), float(spec.origin_y_m)
+    return CostmapView(np.ascontiguousarray(costs), *origin_m, float(spec.resolution_m))
 
 
 def shift(cells: NDArray[np.uint8], move_x: int, move_y: int, empty: int) -> None:

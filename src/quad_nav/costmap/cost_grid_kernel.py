@@ -26,17 +26,7 @@ class CostmapView(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def cell_index(world_m: float, origin_m: float, resolution_m: float, size: int) -> int:
-    """Return the index along one axis of the cell that holds a coordinate.
-
-    Args:
-        world_m: Coordinate in the grid's frame.
-        origin_m: Lower border of the grid.
-        resolution_m: Size of a cell.
-        size: Number of cells along the axis.
-
-    Returns:
-        The index; -1 outside of the grid and for NaN.
-    """
+    """Return the index along one axis of the cell that holds a coordinate, -1 off the grid."""
     cell = (world_m - origin_m) / resolution_m
     if not 0.0 <= cell < size:
         return -1
@@ -74,18 +64,9 @@ def place_polygon(
     sin: float,
     bounds: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Turn a polygon, then move it; grow bounds by it.
+    """Turn a polygon, float64[n, 2], then move it by (x, y); grow bounds, float64[4], by it.
 
-    Args:
-        vertices: float64[n, 2], metres.
-        x: Displacement along x, metres.
-        y: Displacement along y.
-        cos: Cosine of the angle to turn by.
-        sin: Its sine.
-        bounds: float64[4], as for ``include``.
-
-    Returns:
-        float64[n, 2], the order of operations as in ``Pose2D.transform``.
+    The order of operations is that of ``Pose2D.transform``.
     """
     placed = np.empty_like(vertices)
     for k in range(vertices.shape[0]):
@@ -117,15 +98,10 @@ def fill_polygon(costmap: CostmapView, vertices: NDArray[np.float64], value: int
 
 @njit(cache=True, nogil=True)
 def fill_convex_polygon(costs: NDArray[Any], vertices: NDArray[np.int64], value: int) -> None:
-    """Set every cell of a convex polygon, outline included.
+    """Set every cell of a convex polygon of cells (x, y), int64[n, 2], n >= 3, outline included.
 
-    The outline is drawn with Bresenham's lines in the order of the vertices. Each column is
-    filled from its lowest to its highest outline cell, as costmap_2d does.
-
-    Args:
-        costs: uint8[H, W], or bool[H, W] for a mask.
-        vertices: int64[n, 2], cells (x, y) inside the grid, n >= 3.
-        value: What the cells get.
+    The outline is drawn with Bresenham's lines in the order of the vertices. Each column is filled
+    from its lowest to its highest outline cell, as costmap_2d does.
     """
     size_y, size_x = costs.shape
     lowest = np.full(size_x, size_y, np.int64)
@@ -139,6 +115,44 @@ def fill_convex_polygon(costs: NDArray[Any], vertices: NDArray[np.int64], value:
     for x in range(size_x):
         for y in range(lowest[x], highest[x] + 1):
             costs[y, x] = value
+
+
+@njit(cache=True, nogil=True)
+def draw_line(
+    flat_cells: NDArray[Any],
+    size_x: int,
+    x0: int,
+    y0: int,
+    x1: int,
+    y1: int,
+    max_cells: float,
+    value: int,
+) -> None:
+    """Set the cells of Bresenham's line from (x0, y0) to (x1, y1), both on the grid and included.
+
+    The cells, uint8 or bool[H * W], are row by row, ``size_x`` in each. The line is cut to
+    ``max_cells``, measured along it.
+    """
+    dx, dy = x1 - x0, y1 - y0
+    scale = 1.0
+    if dx * dx + dy * dy > max_cells * max_cells:
+        scale = max_cells / math.hypot(dx, dy)
+    along, across = abs(dx), abs(dy)
+    step_along = 1 if dx > 0 else -1
+    step_across = size_x if dy > 0 else -size_x
+    if across > along:
+        along, across = across, along
+        step_along, step_across = step_across, step_along
+    cell = y0 * size_x + x0
+    error = along // 2
+    for _ in range(int(scale * along)):
+        flat_cells[np.uint64(cell)] = value  # unsigned indices save the test for a negative one
+        cell += step_along
+        error += across
+        if error >= along:
+            cell += step_across
+            error -= along
+    flat_cells[np.uint64(cell)] = value
 
 
 @njit(cache=True, nogil=True)
@@ -169,13 +183,9 @@ def _span_line(
 
 @njit(cache=True, nogil=True)
 def reset_to(cells: NDArray[np.uint8], cost: int) -> None:
-    """Give all cells a cost; rows that have it are not written to.
+    """Give all cells, uint8[H, W], a cost; rows that have it are not written to.
 
     The system gives memory to a new grid when it is written to: large maps are mostly free.
-
-    Args:
-        cells: uint8[H, W], changed in place.
-        cost: The cost.
     """
     wanted = np.uint8(cost)
     for y in range(cells.shape[0]):
@@ -189,13 +199,9 @@ def reset_to(cells: NDArray[np.uint8], cost: int) -> None:
 
 @njit(cache=True, nogil=True)
 def raise_to(below: NDArray[np.uint8], above: NDArray[np.uint8]) -> None:
-    """Keep the higher cost of each cell; unknown is the lowest.
+    """Keep the higher cost of each cell, uint8[H, W], in ``below``; unknown is the lowest.
 
     Rows in which nothing is raised are not written to, as in ``reset_to``.
-
-    Args:
-        below: uint8[H, W], raised in place.
-        above: uint8[H, W].
     """
     for y in range(below.shape[0]):
         any_higher = False
@@ -214,25 +220,13 @@ def _is_raised(cost: np.uint8, other: np.uint8) -> bool:
 
 @njit(cache=True, nogil=True)
 def raise_discs(
-    cells: NDArray[np.uint8],
-    origin_x_m: float,
-    origin_y_m: float,
-    resolution_m: float,
-    centres: NDArray[np.float64],
-    radius_m: float,
-    value: int,
+    costmap: CostmapView, centres: NDArray[np.float64], radius_m: float, value: int
 ) -> None:
-    """Raise the cells whose centres lie in discs; cells that are higher stay.
+    """Raise to a value the cells whose centres lie in discs; cells that are higher stay.
 
-    Args:
-        cells: uint8[H, W], changed in place.
-        origin_x_m: Corner of cell (0, 0) in the grid's frame.
-        origin_y_m: Corner of cell (0, 0) in the grid's frame.
-        resolution_m: Size of a cell.
-        centres: float64[n, 2], metres in the grid's frame.
-        radius_m: Radius of the discs.
-        value: What the cells are raised to.
+    The discs have centres float64[n, 2], metres in the grid's frame.
     """
+    cells, origin_x_m, origin_y_m, resolution_m = costmap
     size_y, size_x = cells.shape
     firsts, ends = np.zeros(size_y, np.int64), np.zeros(size_y, np.int64)  # raised in each row
     for k in range(centres.shape[0]):
@@ -258,11 +252,8 @@ def nearest_cell(
 ) -> Tuple[int, int]:
     """Find the nearest cell, in steps to four neighbours, that is neither blocked nor unwanted.
 
-    Args:
-        blocked: uint8[H, W], not 0 for cells that cannot be entered; the start may be one.
-        unwanted: uint8[H, W], not 0 for cells that can be crossed and are no result.
-        start_x: Column of the start.
-        start_y: Row of the start.
+    Blocked cells, uint8[H, W], cannot be entered; the start may be one. Unwanted ones can be
+    crossed and are no result.
 
     Returns:
         The cell (x, y), or (-1, -1) if there is none.

@@ -18,7 +18,7 @@ from typing import Any, List, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.costmap.cost_grid import NOWHERE, Bounds, CostGrid, Window
+from quad_nav.costmap.cost_grid import NOWHERE, Bounds, CostGrid, Square, Window
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, GridSpec
 from quad_nav.parameter import flag
@@ -59,15 +59,10 @@ class Layer:
         self.params = params
 
     def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
-        """Prepare an update.
-
-        Args:
-            robot: Pose of the robot in the global frame.
-            now_s: Current time.
-            bounds: Where the layers before write.
+        """Prepare an update of a robot at a pose in the global frame.
 
         Returns:
-            Bounds that hold ``bounds`` and where this layer writes.
+            Bounds that hold ``bounds``, where the layers before write, and where this layer writes.
         """
         return bounds
 
@@ -88,23 +83,11 @@ class Layer:
         """Forget collected knowledge."""
 
     def clear_area(
-        self,
-        centre_x_m: float,
-        centre_y_m: float,
-        size_m: float,
-        keep_inside: bool,
-        redraw: Redraw = Redraw.BEFORE_MOVING,
-    ) -> bool:
-        """Forget the outside of a square (``keep_inside``) or its inside; False if it cannot."""
-        return False
+        self, square: Square, keep_inside: bool, redraw: Redraw = Redraw.BEFORE_MOVING
+    ) -> None:
+        """Forget the outside of a square (``keep_inside``) or its inside."""
 
-    def free_square(
-        self,
-        centre_x_m: float,
-        centre_y_m: float,
-        size_m: float,
-        redraw: Redraw = Redraw.BEFORE_MOVING,
-    ) -> bool:
+    def free_square(self, square: Square, redraw: Redraw = Redraw.BEFORE_MOVING) -> bool:
         """Remove the obstacles in a square; False if there is nothing to free."""
         return False
 
@@ -139,30 +122,18 @@ class GridLayer(Layer):
         return bounds
 
     def clear_area(
-        self,
-        centre_x_m: float,
-        centre_y_m: float,
-        size_m: float,
-        keep_inside: bool,
-        redraw: Redraw = Redraw.BEFORE_MOVING,
-    ) -> bool:
+        self, square: Square, keep_inside: bool, redraw: Redraw = Redraw.BEFORE_MOVING
+    ) -> None:
         """Make cells unknown, as ``clear_costmap_recovery`` does."""
-        self.grid.forget_area(centre_x_m, centre_y_m, size_m, keep_inside)
+        self.grid.forget_area(square, keep_inside)
         self._pass_on(self._whole_map(), redraw)
-        return True
 
-    def free_square(
-        self,
-        centre_x_m: float,
-        centre_y_m: float,
-        size_m: float,
-        redraw: Redraw = Redraw.BEFORE_MOVING,
-    ) -> bool:
+    def free_square(self, square: Square, redraw: Redraw = Redraw.BEFORE_MOVING) -> bool:
         """Free a square of the layer; return False if it leaves the map."""
-        if not self.grid.fill_square(centre_x_m, centre_y_m, size_m, FREE):
+        if not self.grid.fill_polygon(square.corners, FREE):
             return False
-        square = Bounds(centre_x_m, centre_y_m, centre_x_m, centre_y_m).grown(0.5 * size_m)
-        self._pass_on(square, redraw)
+        x_m, y_m, side_m = square
+        self._pass_on(Bounds(x_m, y_m, x_m, y_m).grown(0.5 * side_m), redraw)
         return True
 
     def is_current(self, now_s: float) -> bool:

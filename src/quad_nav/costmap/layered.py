@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav import footprint as footprints
-from quad_nav.costmap.cost_grid import NO_CELLS, NOWHERE, CostGrid, Window
+from quad_nav.costmap.collision import footprint_cost
+from quad_nav.costmap.cost_grid import NO_CELLS, NOWHERE, CostGrid, Square, Window
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layer import Layer, LayerParams, Redraw
 from quad_nav.costmap.map_params import MapParams
@@ -119,18 +120,17 @@ class LayeredCostmap:
         """Master grid, uint8[H, W]; copy what has to outlive an update."""
         return self._master.costs
 
+    def footprint_cost(self, pose: Pose2D) -> float:
+        """Return the highest cost under the footprint's outline; see ``collision``."""
+        at = float(pose.x_m), float(pose.y_m), float(pose.yaw_rad)
+        return footprint_cost(self._master.view, self.footprint, at)
+
     def update(self, now_s: float, robot: Pose2D) -> Window:
-        """Update the master grid.
-
-        Inflation can change costs up to two inflation radii outside of the returned window,
-        as in costmap_2d.
-
-        Args:
-            now_s: Current time.
-            robot: Pose of the robot in the global frame.
+        """Update the master grid for a robot at a pose in the global frame.
 
         Returns:
-            Cells that may have changed.
+            Cells that may have changed. Inflation can change costs up to two inflation radii
+            outside of them, as in costmap_2d.
         """
         if self.params.rolling_window:
             self._master.centre_on(robot.x_m, robot.y_m)
@@ -170,67 +170,31 @@ class LayeredCostmap:
     def clear_area(
         self,
         layer_names: Iterable[str],
-        centre_x_m: float,
-        centre_y_m: float,
-        size_m: float,
+        square: Square,
         keep_inside: bool,
         redraw: Redraw = Redraw.BEFORE_MOVING,
-    ) -> List[str]:
-        """Forget costs of layers outside or inside of a square.
+    ) -> None:
+        """Forget costs of the named layers outside (``keep_inside``) or inside of a square.
 
-        Args:
-            layer_names: Names of the layers; unknown names are ignored.
-            centre_x_m: Centre of the square in the global frame.
-            centre_y_m: Centre of the square in the global frame.
-            size_m: Length of its sides.
-            keep_inside: True to forget everything outside, False everything inside.
-            redraw: When the master grid follows.
-
-        Returns:
-            Names of the layers that were cleared.
+        ``redraw`` says when the master grid follows. Unknown names are ignored.
         """
-        wanted = set(layer_names)
-        return [
-            name
-            for name, layer in self.layers.items()
-            if name in wanted
-            and layer.clear_area(centre_x_m, centre_y_m, size_m, keep_inside, redraw)
-        ]
+        for name in [name for name in self.layers if name in set(layer_names)]:
+            self.layers[name].clear_area(square, keep_inside, redraw)
 
-    def free_square(self, centre_x_m: float, centre_y_m: float, size_m: float) -> None:
+    def free_layers(
+        self, layer_names: Iterable[str], square: Square, redraw: Redraw = Redraw.BEFORE_MOVING
+    ) -> bool:
+        """Free a square of the named layers; return False if none did: it leaves the map."""
+        named = [self.layers[name] for name in self.layers if name in set(layer_names)]
+        return any([layer.free_square(square, redraw) for layer in named])
+
+    def free_square(self, square: Square) -> None:
         """Make the master grid free in a square.
 
         Layers with other knowledge overwrite it at the next update. A square that leaves the
         map is ignored.
         """
-        self._master.fill_square(centre_x_m, centre_y_m, size_m, FREE)
-
-    def free_layers(
-        self,
-        layer_names: Iterable[str],
-        centre_x_m: float,
-        centre_y_m: float,
-        size_m: float,
-        redraw: Redraw = Redraw.BEFORE_MOVING,
-    ) -> List[str]:
-        """Free a square of layers.
-
-        Args:
-            layer_names: Names of the layers; unknown names are ignored.
-            centre_x_m: Centre of the square in the global frame.
-            centre_y_m: Centre of the square in the global frame.
-            size_m: Length of its sides.
-            redraw: When the master grid follows.
-
-        Returns:
-            Names of the layers that did so; none if the square leaves the map.
-        """
-        wanted = set(layer_names)
-        return [
-            name
-            for name, layer in self.layers.items()
-            if name in wanted and layer.free_square(centre_x_m, centre_y_m, size_m, redraw)
-        ]
+        self._master.fill_polygon(square.corners, FREE)
 
     @property
     def obstacle_layers(self) -> List[str]:
@@ -269,12 +233,8 @@ class LayeredCostmap:
     def set_map_poses(self, map_from_global: Mapping[str, Optional[Pose3D]]) -> None:
         """Set the latest transforms to the frames of maps, for the following updates.
 
-        A map whose frame has no pose is not drawn. A costmap that is no rolling window ignores
-        the frames of its maps.
-
-        Args:
-            map_from_global: Pose of the costmap's global frame in each of ``map_frames``; None
-                or missing if unknown.
+        A map whose frame, of ``map_frames``, has no pose of the global frame is not drawn. A
+        costmap that is no rolling window ignores the frames of its maps.
         """
         self._map_poses = {**map_from_global, self.params.global_frame: Pose3D(0.0, 0.0, 0.0)}
         for layer in self._static_layers:

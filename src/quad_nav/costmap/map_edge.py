@@ -20,15 +20,10 @@ def closed_edge(
 ) -> Iterator[None]:
     """Mark the cells at the edge of a costmap as obstacles, for the search of a plan.
 
-    These are the cells whose centres are nearer to the edge than the robot's inscribed radius.
-    At the end they have their costs again. Nothing is marked in a costmap that rolls with the
-    robot, and if start or goal are that near to the edge or off the costmap.
-
-    Args:
-        costmap: The global costmap; its costs are changed in place.
-        start: Start of the plan in the costmap's frame.
-        goal: End of the plan in the same frame.
-        closes: Whether to mark anything, ``NavigatorParams.plan_inside_map``.
+    These are the cells whose centres are nearer to the edge than the robot's inscribed radius. At
+    the end they have their costs again. Nothing is marked without ``closes``
+    (``NavigatorParams.plan_inside_map``), in a costmap that rolls with the robot, and if start or
+    goal, in the costmap's frame, are that near to the edge or off the costmap.
     """
     spec, costs = costmap.spec, costmap.costs
     cells = int(costmap.inscribed_radius_m / spec.resolution_m + 0.5)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Callable, List, Optional, Tuple, Union
+from functools import cached_property, lru_cache
+from typing import Callable, List, Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,59 +60,43 @@ class SourceParams:
     )
 
 
-Points = Union[NDArray[np.float32], Callable[[], NDArray[np.float32]]]
+MakePoints = Callable[[], NDArray[np.float32]]
+"""Makes float32[n, 3], metres."""
 
 
 class Observation:
-    """Points of one message, in the global frame.
+    """Points of one message, in the global frame, made when a costmap first needs them.
+
+    Many messages need not be projected: another comes before the costmaps are updated.
 
     Attributes:
         stamp_s: When the sensor saw them.
         sensor: float64[3], where the rays start, metres.
         stamp_ns: The stamp in whole nanoseconds.
+        some_mark: Not all of the points mark.
     """
 
     def __init__(
         self,
         stamp_s: float,
         sensor: NDArray[np.float64],
-        points: Points,
-        marks: Optional[Points] = None,
+        make_points: MakePoints,
+        make_marks: Optional[MakePoints] = None,
     ) -> None:
-        """Take points, or a function that makes them when a costmap first needs them.
-
-        Many messages need not be projected: another comes before the costmaps are updated.
-
-        Args:
-            stamp_s: When the sensor saw the points.
-            sensor: float64[3], where the rays start, metres.
-            points: float32[n, 3], metres.
-            marks: float32[m, 3], those of the points that mark; None for all of them.
-        """
         self.stamp_s, self.sensor = stamp_s, sensor
         self.stamp_ns = _nanoseconds(stamp_s)
-        self._points, self._marks = points, marks
+        self.some_mark = make_marks is not None
+        self._make_points, self._make_marks = make_points, make_marks
 
-    @property
+    @cached_property
     def points(self) -> NDArray[np.float32]:
         """float32[n, 3], metres."""
-        if callable(self._points):
-            self._points = self._points()
-        return self._points
+        return self._make_points()
 
-    @property
-    def some_mark(self) -> bool:
-        """True if not all of the points mark."""
-        return self._marks is not None
-
-    @property
+    @cached_property
     def marks(self) -> NDArray[np.float32]:
         """float32[m, 3], the points that mark, metres."""
-        if self._marks is None:
-            return self.points
-        if callable(self._marks):
-            self._marks = self._marks()
-        return self._marks
+        return self.points if self._make_marks is None else self._make_marks()
 
 
 class ObservationBuffer:
@@ -140,14 +124,7 @@ class ObservationBuffer:
         self._period_ns = _nanoseconds(period_s)
 
     def stack(self, ranges: Ranges) -> Tuple[ObservationStack, int, int]:
-        """Return the observations for the kernels.
-
-        Args:
-            ranges: Limits of what an observation clears and marks.
-
-        Returns:
-            A ring that has them, the slot of the newest, and their number.
-        """
+        """Return the observations for the kernels: a ring, the slot of the newest, their number."""
         kept = len(self.observations)
         if ranges != self._ranges:
             self._ranges, self._unstored = ranges, kept

@@ -50,31 +50,18 @@ def store_observation(
     points: NDArray[np.float32],
     ranges: Ranges,
 ) -> None:
-    """Put an observation into a slot.
+    """Put points, float32[n, 3], into a slot of the ring, as rays and as marks.
 
-    Args:
-        seen: The ring.
-        slot: Number of the slot.
-        sensor: float64[3], where the rays start.
-        points: float32[n, 3].
-        ranges: Limits.
+    The rays start at the sensor, float64[3].
     """
-    ends, sectors, marks = seen.ends[slot], seen.sectors[slot], seen.marks[slot]
+    ends, sectors = seen.ends[slot], seen.sectors[slot]
     seen.sensors[slot] = sensor
-    sensor_x, sensor_y, sensor_z = sensor[0], sensor[1], sensor[2]
-    count = 0
     for k in range(points.shape[0]):
-        x, y, z = float(points[k, 0]), float(points[k, 1]), float(points[k, 2])
-        dx, dy, dz = x - sensor_x, y - sensor_y, z - sensor_z
         ends[k, 0], ends[k, 1] = points[k, 0], points[k, 1]
-        sectors[k] = sector_of(dx, dy)
-        if z > ranges.max_height_m:
-            continue
-        if dx * dx + dy * dy + dz * dz < ranges.mark_m * ranges.mark_m:
-            marks[count, 0], marks[count, 1] = points[k, 0], points[k, 1]
-            count += 1
-    seen.counts[slot, 0], seen.counts[slot, 1] = points.shape[0], count
+        sectors[k] = sector_of(float(points[k, 0]) - sensor[0], float(points[k, 1]) - sensor[1])
+    seen.counts[slot, 0] = points.shape[0]
     seen.reaches[slot], seen.drawn[slot] = np.nan, np.nan
+    store_marks(seen, slot, sensor, points, ranges)
 
 
 @njit(cache=True, nogil=True)
@@ -85,7 +72,7 @@ def store_marks(
     points: NDArray[np.float32],
     ranges: Ranges,
 ) -> None:
-    """Replace the points of a slot that mark; the arguments are those of ``store_observation``."""
+    """Set the points of a slot that mark; the arguments are those of ``store_observation``."""
     marks, count = seen.marks[slot], 0
     for k in range(points.shape[0]):
         x, y, z = float(points[k, 0]), float(points[k, 1]), float(points[k, 2])
@@ -138,19 +125,12 @@ def include_rays(
     range_m: float,
     bounds: NDArray[np.float64],
 ) -> None:
-    """Grow bounds by the sensor, and by what each of its rays reaches within the grid.
+    """Grow bounds, float64[4], by the sensor, and by what each of its rays reaches within the grid.
 
-    Bounds of the rays in the grid are kept for later updates with the same grid. They are not
-    worked out if ``bounds`` hold the whole grid already, nor, in another grid, if the rays lie
-    within ``bounds``: a ray in the grid is a part of the ray without one, and ends in the grid.
-    The last millimetre of a grid makes no other cell.
-
-    Args:
-        costmap: The costmap.
-        seen: Observations.
-        slot: Slot of the one whose rays count.
-        range_m: Length to which rays are cleared.
-        bounds: float64[4], min x, min y, max x, max y in metres.
+    Rays are cleared to ``range_m``. Bounds of the rays in the grid are kept for later updates with
+    the same grid. They are not worked out if ``bounds`` hold the whole grid already, nor, in
+    another grid, if the rays lie within ``bounds``: a ray in the grid is a part of the ray without
+    one, and ends in the grid. The last millimetre of a grid makes no other cell.
     """
     costs, origin_x, origin_y, resolution = costmap
     size_y, size_x = costs.shape

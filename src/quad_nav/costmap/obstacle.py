@@ -18,8 +18,7 @@ from quad_nav.costmap.cost_grid_kernel import place_polygon
 from quad_nav.costmap.layer import GridLayer, LayerParams, Redraw
 from quad_nav.costmap.observation import Observation, ObservationBuffer, SourceParams
 from quad_nav.costmap.observation_kernel import Ranges
-from quad_nav.costmap.projection import scan_points, transform_points
-from quad_nav.costmap.projection_kernel import outside_circles
+from quad_nav.costmap.projection import outside_circles, scan_points, transform_points
 from quad_nav.costmap.raytrace import clear_all_rays, mark_all_points
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
@@ -139,7 +138,7 @@ class ObstacleLayer(GridLayer):
     ) -> None:
         """Take a scan that arrived at ``now_s``; the other arguments as ``observe_scan``."""
         observation = self.observe_scan(source_name, scan, global_from_sensor, global_from_origin)
-        self.add_observation(source_name, observation, now_s)
+        self.buffers[source_name].add(observation, now_s)
 
     def add_cloud(
         self,
@@ -154,10 +153,6 @@ class ObstacleLayer(GridLayer):
         observation = self.observe_cloud(
             source_name, points, global_from_sensor, stamp_s, global_from_origin
         )
-        self.add_observation(source_name, observation, now_s)
-
-    def add_observation(self, source_name: str, observation: Observation, now_s: float) -> None:
-        """Take an observation that arrived at ``now_s``, perhaps shared with other layers."""
         self.buffers[source_name].add(observation, now_s)
 
     def observe_scan(
@@ -213,7 +208,7 @@ class ObstacleLayer(GridLayer):
         if len(self.excluded_circles):
             points = outside_circles(points, self.excluded_circles)
         origin = global_from_origin or global_from_sensor
-        return Observation(stamp_s, origin.translation, points)
+        return Observation(stamp_s, origin.translation, lambda: points)
 
     def projection_key(self, source_name: str) -> Tuple[bool, float, float]:
         """Return what decides a projection besides poses and circles left out.

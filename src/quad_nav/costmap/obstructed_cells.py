@@ -40,12 +40,9 @@ def sector_of(dx: float, dy: float) -> int:
 def find_obstructed(
     costs: NDArray[np.uint8], window: Tuple[int, int, int, int], obstructed: NDArray[np.int64]
 ) -> int:
-    """Find the cells of a window that are not free.
+    """Find the cells of a window (x0, xn, y0, yn) of costs, uint8[H, W], that are not free.
 
-    Args:
-        costs: uint8[H, W].
-        window: (x0, xn, y0, yn): columns x0..xn-1 and rows y0..yn-1.
-        obstructed: int64[m], filled with flat indices of cells.
+    Their flat indices fill int64[m].
 
     Returns:
         The number of such cells; m + 1 if there are more than m.

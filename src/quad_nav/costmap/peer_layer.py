@@ -76,14 +76,5 @@ class PeerLayer(Layer):
 
     def update_costs(self, master: CostGrid, window: Window) -> None:
         """Raise the cells of the areas."""
-        spec = master.spec
         for area in self._areas:
-            raise_discs(
-                master.costs,
-                spec.origin_x_m,
-                spec.origin_y_m,
-                spec.resolution_m,
-                area.points,
-                area.radius_m,
-                area.cost,
-            )
+            raise_discs(master.view, area.points, area.radius_m, area.cost)

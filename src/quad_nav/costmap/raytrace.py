@@ -11,7 +11,7 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.costmap.cost_grid_kernel import CostmapView, cell_index, cell_of
+from quad_nav.costmap.cost_grid_kernel import CostmapView, cell_index, cell_of, draw_line
 from quad_nav.costmap.observation_kernel import ObservationStack, clip_to_grid, include_rays
 from quad_nav.costmap.obstructed_cells import (
     MAX_OBSTRUCTED,
@@ -27,43 +27,6 @@ MAX_LINES = 2**16  # that an update remembers: in grids up to 256 x 256 one to e
 
 
 @njit(cache=True, nogil=True)
-def clear_line(
-    flat_costs: NDArray[np.uint8], size_x: int, x0: int, y0: int, x1: int, y1: int, max_cells: float
-) -> None:
-    """Free the cells of Bresenham's line, both of its ends included.
-
-    Args:
-        flat_costs: uint8[H * W], changed in place.
-        size_x: Cells in a row.
-        x0: Column of the first cell, inside the grid.
-        y0: Row of the first cell.
-        x1: Column of the cell that the line leads to, inside the grid.
-        y1: Row of that cell.
-        max_cells: Length, measured along the line, to which it is cut.
-    """
-    dx, dy = x1 - x0, y1 - y0
-    scale = 1.0
-    if dx * dx + dy * dy > max_cells * max_cells:
-        scale = max_cells / math.hypot(dx, dy)
-    along, across = abs(dx), abs(dy)
-    step_along = 1 if dx > 0 else -1
-    step_across = size_x if dy > 0 else -size_x
-    if across > along:
-        along, across = across, along
-        step_along, step_across = step_across, step_along
-    cell = y0 * size_x + x0
-    error = along // 2
-    for _ in range(int(scale * along)):
-        flat_costs[np.uint64(cell)] = FREE  # unsigned indices save the test for a negative one
-        cell += step_along
-        error += across
-        if error >= along:
-            cell += step_across
-            error -= along
-    flat_costs[np.uint64(cell)] = FREE
-
-
-@njit(cache=True, nogil=True)
 def clear_rays(
     costmap: CostmapView,
     seen: ObservationStack,
@@ -72,7 +35,7 @@ def clear_rays(
     wanted: NDArray[np.bool_],
     cleared: NDArray[np.int64],
 ) -> None:
-    """Free the cells between a sensor on the costmap and each of its points.
+    """Free the cells between a sensor on the costmap and each of the points of its slot.
 
     Args:
         costmap: The costmap, changed in place.
@@ -110,7 +73,7 @@ def clear_rays(
             if cleared[place] == line:
                 continue
             cleared[place] = line
-        clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells)
+        draw_line(flat_costs, size_x, x0, y0, x1, y1, max_cells, FREE)
 
 
 @njit(cache=True, nogil=True)
@@ -122,19 +85,11 @@ def clear_all_rays(
     range_m: float,
     bounds: NDArray[np.float64],
 ) -> None:
-    """Apply ``clear_rays`` and ``include_rays`` to observations, the newest first.
+    """Apply ``clear_rays`` and ``include_rays`` to ``count`` observations, the newest first.
 
-    A line through nothing but free cells changes nothing. Mostly the first observation
-    leaves few cells that are not free; from then on only lines towards those are cleared.
-    A sensor off the costmap clears nothing.
-
-    Args:
-        costmap: The costmap, changed in place.
-        seen: The observations.
-        newest: Slot of the newest one.
-        count: Number of observations.
-        range_m: Length to which rays are cleared.
-        bounds: float64[4], min x, min y, max x, max y in metres, grown by what rays reach.
+    A line through nothing but free cells changes nothing. Mostly the first observation leaves few
+    cells that are not free; from then on only lines towards those are cleared. A sensor off the
+    costmap clears nothing.
     """
     no_lines = np.empty(0, dtype=np.int64)
     lines = no_lines
@@ -208,15 +163,7 @@ def mark_all_points(
     count: int,
     bounds: NDArray[np.float64],
 ) -> None:
-    """Make the cells of the points that mark lethal.
-
-    Args:
-        costmap: The costmap, changed in place.
-        seen: The observations.
-        newest: Slot of the newest one.
-        count: Number of observations.
-        bounds: float64[4], as for ``clear_all_rays``, grown by the marked points.
-    """
+    """Make the cells of the points that mark lethal, and grow bounds, float64[4], by those."""
     costs, origin_x, origin_y, resolution = costmap
     size_y, size_x = costs.shape
     min_x, min_y, max_x, max_y = bounds[0], bounds[1], bounds[2], bounds[3]

@@ -70,13 +70,7 @@ class ScanIntake:
     """
 
     def __init__(self, sinks: Sequence[Sink], filters: ScanFilters, local_frame: str) -> None:
-        """Hand messages to sinks.
-
-        Args:
-            sinks: Layers and sources that take the messages.
-            filters: The robot's filters of scans.
-            local_frame: Global frame of the local costmap.
-        """
+        """Hand messages to sinks, in a robot whose local costmap has a global frame."""
         self.sinks = tuple(sinks)
         self._filters, self._local_frame = filters, local_frame
         frames = [sink.costmap.params.global_frame for sink in self.sinks]
@@ -166,11 +160,8 @@ class ScanIntake:
     ) -> None:
         """Hand a point cloud to the layers.
 
-        Args:
-            points: float32[n, 3], metres in the frame of ``poses[k].frame``, all finite.
-            poses: Poses at the cloud's stamp, one for each sink.
-            stamp_s: When the points were measured.
-            received_s: When the cloud arrived, as for ``add_scan``.
+        Its points, float32[n, 3], are in the frame of ``poses[k].frame``, all finite; see
+        ``add_scan``.
         """
 
         def make(sink: Sink, pose: SensorPose) -> Observation:

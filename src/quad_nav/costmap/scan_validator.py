@@ -20,8 +20,8 @@ from typing import Dict, Optional, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.costmap.projection_kernel import count_returns
 from quad_nav.costmap.scan_filter import FilteredScan, ScanFilter, ScanSituation
+from quad_nav.files.kernel_cache import njit
 from quad_nav.geometry import Pose3D, Scan, angle_difference
 from quad_nav.parameter import flag
 
@@ -81,15 +81,12 @@ class SensorValidator:
     ) -> str:
         """Return the reason to reject a scan that arrives now, "" to accept it.
 
-        Args:
-            scan: The scan.
-            frame_from_sensor: Pose of the LIDAR at the scan's stamp, in a fixed frame.
-            now_s: Current time.
-            expected_period_s: A scan of this age is late; with 0 none is.
+        The LIDAR's pose at the scan's stamp is in a fixed frame. A scan of the expected period's
+        age is late; with 0 none is.
         """
         here = frame_from_sensor
         ranges = np.ascontiguousarray(scan.ranges_m, dtype=np.float32)
-        returns, near = count_returns(
+        returns, near = _count_returns(
             ranges,
             np.float32(scan.range_min_m),
             np.float32(scan.range_max_m),
@@ -168,3 +165,16 @@ def _distance_m(a: Pose3D, b: Pose3D) -> float:
 
 def _differ(a: Pose3D, b: Pose3D, by_m: float, by_rad: float) -> bool:
     return _distance_m(a, b) > by_m or abs(angle_difference(a.yaw_rad, b.yaw_rad)) > by_rad
+
+
+@njit(cache=True, nogil=True)
+def _count_returns(
+    ranges: NDArray[np.float32], range_min: np.float32, range_max: np.float32, near: np.float32
+) -> Tuple[int, int]:
+    """Count the ranges, float32[n], in [range_min, range_max) and in [range_min, near)."""
+    returns = nearer = 0
+    for k in range(ranges.shape[0]):
+        if ranges[k] >= range_min:
+            returns += ranges[k] < range_max
+            nearer += ranges[k] < near
+    return returns, nearer

@@ -8,14 +8,7 @@ from typing import Optional, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.costmap.cost_grid import (
-    NO_CELLS,
-    NOWHERE,
-    Bounds,
-    CostGrid,
-    Window,
-    merge_maximum,
-)
+from quad_nav.costmap.cost_grid import NO_CELLS, NOWHERE, Bounds, CostGrid, Window, merge_maximum
 from quad_nav.costmap.layer import GridLayer, LayerParams
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec

@@ -46,16 +46,9 @@ def clear_voxel_rays(
 ) -> bool:
     """Free the voxels from a sensor towards each of its points, and their columns' costs.
 
-    Args:
-        grid: The voxels, changed in place.
-        sensor: float64[3], where the rays start, metres in the global frame.
-        points: float32[n, 3], metres in the global frame.
-        limits: Limits of the rays.
-        bounds: float64[4], min x, min y, max x, max y in metres, grown by the ends of rays, and
-            by the sensor if rays are clipped.
-
-    Returns:
-        False if the sensor is outside of the voxels and nothing was cleared.
+    Sensor, float64[3], and points, float32[n, 3], are in the global frame. Bounds, float64[4], grow
+    by the ends of rays, and by the sensor if rays are clipped. A sensor outside of the voxels
+    clears nothing; then the result is False.
     """
     origin, size = grid.origin, grid.size
     size_y, size_x, size_z = grid.voxels.shape
@@ -95,18 +88,12 @@ def clear_voxel_rays(
 def ray_end(
     grid: VoxelGrid, sensor: NDArray[np.float64], point: NDArray[np.float32], limits: RayLimits
 ) -> Triple:
-    """Return the point (x, y, z) where the ray to a point ends.
+    """Return the point (x, y, z) where the ray from a sensor, float64[3], to a point ends.
 
-    It is two cells short of the point, so that a ray does not clear the obstacle that it
-    met, and before the borders of the voxels. The order of operations is that of costmap_2d.
-    All numbers are metres in the global frame.
-
-    Args:
-        grid: The voxels.
-        sensor: float64[3], where the ray starts.
-        point: float32[3], what the sensor saw.
-        limits: Limits of the ray. Without ``clip`` the end can be outside of the voxels by
-            rounding, or above them, and behind the sensor if that is in the last half cell.
+    It is two cells short of the point, so that a ray does not clear the obstacle that it met, and
+    before the borders of the voxels. The order of operations is that of costmap_2d. Without
+    ``clip`` the end can be outside of the voxels by rounding, or above them, and behind the sensor
+    if that is in the last half cell.
     """
     origin, size = grid.origin, grid.size
     size_y, size_x, size_z = grid.voxels.shape
@@ -157,13 +144,9 @@ def _cut(t: float, to_border: float, step: float) -> float:
 
 @njit(cache=True, nogil=True)
 def clear_voxel_line(grid: VoxelGrid, begin: Triple, end: Triple, max_voxels: float) -> None:
-    """Free the voxels of Bresenham's line in three dimensions, both of its ends included.
+    """Free the voxels of Bresenham's line between two points, in voxels from the corner.
 
-    Args:
-        grid: The voxels, changed in place.
-        begin: (x, y, z) in voxels from the corner.
-        end: (x, y, z) in voxels from the corner.
-        max_voxels: Length, measured along the line, to which it is cut.
+    Both of its ends are included. It is cut to ``max_voxels``, measured along the line.
     """
     x0, y0, z0 = begin
     x1, y1, z1 = end
@@ -217,15 +200,8 @@ def mark_voxels(
 ) -> None:
     """Mark the voxels of points, and make lethal the columns with enough marked voxels.
 
-    Points below the voxels go into the lowest one; points above them are ignored.
-
-    Args:
-        grid: The voxels, changed in place.
-        sensor: float64[3], position of the sensor, metres in the global frame.
-        points: float32[n, 3], metres in the global frame.
-        range_m: Points at this distance from the sensor, or farther, are ignored.
-        max_height_m: Points with a higher z are ignored.
-        bounds: float64[4], min x, min y, max x, max y in metres, grown by lethal columns.
+    Points below the voxels go into the lowest one; points above them, above ``max_height_m``, or
+    ``range_m`` or more from the sensor are ignored. Bounds, float64[4], grow by lethal columns.
     """
     voxels, origin, size = grid.voxels, grid.origin, grid.size
     size_y, size_x, size_z = voxels.shape

@@ -18,13 +18,10 @@ _NAME = "quad-nav"
 
 
 def user_cache_folder(name: str) -> Tuple[Optional[Path], List[str]]:
-    """Make a folder of this user for cached files, and return it.
+    """Make the folder ``name`` of this user for cached files.
 
     It is below ``$XDG_CACHE_HOME`` or ``~/.cache``, or otherwise below the folder of temporary
     files.
-
-    Args:
-        name: Name of the folder inside quad's own cache folder.
 
     Returns:
         The folder, None if there is none; and why each other place cannot be used.

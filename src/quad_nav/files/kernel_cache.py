@@ -53,10 +53,9 @@ FOLDER, PROBLEMS = find_cache_folder()
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Compile a function at its first call, as ``numba.njit`` does.
+    """Compile a function at its first call, as ``numba.njit`` does with these options.
 
-    Args:
-        options: Options of ``numba.njit``. ``cache=True`` is left out if no folder can be written.
+    ``cache=True`` is left out if no folder can be written.
     """
 
     def decorate(function: Callable[..., Any]) -> Any:

@@ -77,9 +77,12 @@ def text(expected: str) -> Rule:
     return Rule(lambda value: isinstance(value, str) and value != "", expected)
 
 
-def optional_text(expected: str) -> Rule:
-    """Rule for a text that may be empty."""
-    return Rule(lambda value: isinstance(value, str), f"{expected}, or nothing")
+def optional(rule: Rule, nothing: Any = "") -> Rule:
+    """The same rule, which also accepts a value that stands for nothing."""
+    return Rule(
+        lambda value: (value == nothing and type(value) is type(nothing)) or rule.accepts(value),
+        f"{rule.expected}, or {str(nothing) or 'nothing'}",
+    )
 
 
 BOOLEAN = Rule(lambda value: isinstance(value, bool), "true or false")

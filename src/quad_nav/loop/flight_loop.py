@@ -51,6 +51,9 @@ class Progress(NamedTuple):
 class FlightLoop:
     """Simulation and navigators of one fleet.
 
+    Every method raises ``WorkerProcessError`` if a worker process has failed and there is no
+    ``on_worker_loss``.
+
     Args:
         setup: The set-up.
         shares: Numbers of the robots that each process navigates, each robot at most once. The
@@ -129,20 +132,12 @@ class FlightLoop:
     # -- time ----------------------------------------------------------------------------
 
     def start(self) -> Mapping[int, LocatedScan]:
-        """Wait for the worker processes and take the first scans; return those of this process.
-
-        Raises:
-            WorkerProcessError: A worker process failed, and there is no ``on_worker_loss``.
-        """
+        """Wait for the worker processes and take the first scans; return those of this process."""
         self._for_each_worker(WorkerProcess.wait_until_ready)
         return self._scan()
 
     def advance(self, steps: int = STEPS_PER_ODOMETRY) -> Progress:
-        """Advance by at most so many steps: the next scan or odometry ends it earlier.
-
-        Raises:
-            WorkerProcessError: A worker process failed, and there is no ``on_worker_loss``.
-        """
+        """Advance by at most so many steps: the next scan or odometry ends it earlier."""
         count, per_scan = self.simulation.step_count, self.setup.steps_per_scan
         next_scan = (count // per_scan + 1) * per_scan
         next_odometry = (count // STEPS_PER_ODOMETRY + 1) * STEPS_PER_ODOMETRY
@@ -158,7 +153,6 @@ class FlightLoop:
             The results in the order of the robots' numbers. No command is set yet.
 
         Raises:
-            WorkerProcessError: A worker process failed, and there is no ``on_worker_loss``.
             PluginError: A plugin has a mistake.
         """
         now_s, states, own = self.now_s, self.states, {}
@@ -217,9 +211,6 @@ class FlightLoop:
 
         Returns:
             The views in the order of the robots' numbers; those of late processes are missing.
-
-        Raises:
-            WorkerProcessError: A worker process failed, and there is no ``on_worker_loss``.
         """
         now_s = self.now_s
         self._for_each_worker(lambda worker: worker.begin_inspecting(what, now_s))
@@ -228,11 +219,7 @@ class FlightLoop:
         return sorted(views, key=attrgetter("robot"))
 
     def change(self, robot: int, change: Change) -> bool:
-        """Change a navigator before its next tick; return False if its process is late.
-
-        Raises:
-            WorkerProcessError: A worker process failed, and there is no ``on_worker_loss``.
-        """
+        """Change a navigator before its next tick; return False if its process is late."""
         if robot in self.group.robots:
             change(self.group)
             return True
@@ -252,7 +239,6 @@ class FlightLoop:
 
         Raises:
             InputError: There is no free position near a start.
-            WorkerProcessError: A worker process failed, and there is no ``on_worker_loss``.
         """
         before_s = self.now_s
         self.simulation.reset(seed, start_step)

@@ -65,44 +65,41 @@ class WorkerProcessError(RuntimeError):
 
 
 class SharedStates:
-    """Memory that both processes share: the bodies at the last few instants, and switches.
-
-    Attributes:
-        rows: float64[SLOTS, n, 13], ``BodyState.rows``.
-        obstacles: float64[SLOTS, m, 3], ``BodyState.obstacles``.
-        lidar_enabled: bool[n], LIDARs that are on.
-    """
+    """Memory that both processes share: the bodies at the last few instants, and switches."""
 
     SLOTS = 16
 
     def __init__(self, robots: int, moving: int, context: Any) -> None:
         """Allocate it in the ``context`` of its process."""
-        self._robots = robots
-        self._raw_rows = context.RawArray("d", self.SLOTS * robots * BODY_VALUES)
-        self._raw_obstacles = context.RawArray("d", self.SLOTS * moving * 3)
-        self._raw_enabled = context.RawArray("b", robots)
-        self._map()
+        self._shape = (self.SLOTS, robots, BODY_VALUES)
+        self._moving_shape = (self.SLOTS, moving, 3)
+        self._rows = context.RawArray("d", self.SLOTS * robots * BODY_VALUES)
+        self._obstacles = context.RawArray("d", self.SLOTS * moving * 3)
+        self._enabled = context.RawArray("b", robots)
         self.lidar_enabled[:] = True
 
-    def _map(self) -> None:
-        self.rows = np.frombuffer(self._raw_rows).reshape(self.SLOTS, self._robots, BODY_VALUES)
-        shape = (self.SLOTS, len(self._raw_obstacles) // (self.SLOTS * 3), 3)
-        self.obstacles: NDArray[np.float64] = np.ndarray(shape, float, self._raw_obstacles)
-        self.lidar_enabled = np.frombuffer(self._raw_enabled, dtype=bool)
+    @property
+    def rows(self) -> NDArray[np.float64]:
+        """float64[SLOTS, n, 13], ``BodyState.rows``."""
+        return np.ndarray(self._shape, float, self._rows)
 
-    def __getstate__(self) -> Tuple[int, Any, Any, Any]:
-        return self._robots, self._raw_rows, self._raw_obstacles, self._raw_enabled
+    @property
+    def obstacles(self) -> NDArray[np.float64]:
+        """float64[SLOTS, m, 3], ``BodyState.obstacles``."""
+        return np.ndarray(self._moving_shape, float, self._obstacles)
 
-    def __setstate__(self, state: Tuple[int, Any, Any, Any]) -> None:
-        self._robots, self._raw_rows, self._raw_obstacles, self._raw_enabled = state
-        self._map()
+    @property
+    def lidar_enabled(self) -> NDArray[np.bool_]:
+        """bool[n], LIDARs that are on."""
+        return np.frombuffer(self._enabled, dtype=bool)
 
 
 class WorkerProcess:
     """A navigator group in a process of its own.
 
     A process that builds its navigators, or is late with results, gets no orders; what is in the
-    attributes waits until it can take some.
+    attributes waits until it can take some. Every method raises ``WorkerProcessError`` if the
+    process has failed.
 
     Attributes:
         robots: Numbers of the robots.
@@ -152,11 +149,7 @@ class WorkerProcess:
 
     @property
     def is_ready(self) -> bool:
-        """True once the navigators are built and while no results are owed.
-
-        Raises:
-            WorkerProcessError: The process failed.
-        """
+        """True once the navigators are built and while no results are owed."""
         if not self._is_ready and self._pipe.poll():
             self.wait_until_ready()
         return self._is_ready and not self._owes_results
@@ -165,7 +158,6 @@ class WorkerProcess:
         """Wait until the navigators are built.
 
         Raises:
-            WorkerProcessError: The process failed.
             InputError: A plugin refuses its parameters.
         """
         if not self._is_ready:
@@ -173,20 +165,12 @@ class WorkerProcess:
             self._is_ready = True
 
     def scan(self, now_s: float, states: RobotStates) -> None:
-        """Start ``NavigatorGroup.scan``; the scans stay in the worker process.
-
-        Raises:
-            WorkerProcessError: The process failed.
-        """
+        """Start ``NavigatorGroup.scan``; the scans stay in the worker process."""
         if self.is_ready:
             self._send("scan", now_s, self._write(states.bodies))
 
     def begin_navigating(self, now_s: float, states: RobotStates) -> None:
-        """Start ``NavigatorGroup.navigate`` if it is due; ``results`` returns what it returns.
-
-        Raises:
-            WorkerProcessError: The process failed.
-        """
+        """Start ``NavigatorGroup.navigate`` if it is due; ``results`` returns what it returns."""
         is_wanted = self.goals or is_due(self._due_s, now_s)
         # The slots of unanswered scans are not written again.
         is_wanted = is_wanted or self._unanswered >= SharedStates.SLOTS - STEPS_PER_S // 40
@@ -204,7 +188,6 @@ class WorkerProcess:
                 call, which does not wait for them again.
 
         Raises:
-            WorkerProcessError: The process failed.
             PluginError: A plugin has a mistake.
         """
         if not self._owes_results:
@@ -232,11 +215,7 @@ class WorkerProcess:
         return views
 
     def change(self, change: Change) -> bool:
-        """Start a change of a navigator; return False while results are owed.
-
-        Raises:
-            WorkerProcessError: The process failed.
-        """
+        """Start a change of a navigator; return False while results are owed."""
         if not self.is_ready:
             return False
         self._send("change", change)
@@ -244,11 +223,7 @@ class WorkerProcess:
         return True
 
     def reset(self, now_s: float, seed: int, jumped_back: bool) -> None:
-        """Start ``NavigatorGroup.reset``.
-
-        Raises:
-            WorkerProcessError: The process failed.
-        """
+        """Start ``NavigatorGroup.reset``."""
         self._send("reset", now_s, seed, jumped_back)
 
     def close(self) -> None:

@@ -186,11 +186,6 @@ def _read_robot(before: RobotCheckpoint, record: Mapping[str, Any]) -> RobotChec
     )
 
 
-def shift_to_clock(progress: SequenceProgress, start_s: float) -> SequenceProgress:
-    """Shift times since the start of the mission to a clock that was ``start_s`` then."""
-    return progress.shifted(start_s)
-
-
 def _instance(values: Any, kind: Callable[..., T]) -> T:
     """Return a dataclass of a JSON object, with the types of its fields."""
     if not isinstance(values, dict):

@@ -109,12 +109,11 @@ class DistanceLog:
         self._is_compared = True
         self._newest_s = self._compared_s = -math.inf
 
-    def add(self, name: str, stamp_s: float, x_m: float, y_m: float) -> None:
-        """Add a robot's position in ``map``; the stamps of one robot increase."""
-        self.add_tracks({name: [(stamp_s, x_m, y_m)]})
-
     def add_tracks(self, tracks: Mapping[str, Sequence[Tuple[float, float, float]]]) -> None:
-        """Add many positions (stamp_s, x_m, y_m) in ``map`` of some robots, one or more of each."""
+        """Add positions (stamp_s, x_m, y_m) in ``map`` of some robots, one or more of each.
+
+        The stamps of one robot increase.
+        """
         for name, track in tracks.items():
             self._samples[name].extend(track)
         self._is_compared = False

@@ -113,22 +113,8 @@ class RobotLog:
             self._pose,
         )
 
-    def add_pose(self, stamp_s: float, pose: Pose2D) -> bool:
-        """Add a pose in ``map``; return False if it is not newer than the last one."""
-        if self._pose is not None:
-            if stamp_s <= self._stamp_s:
-                return False
-            if self._is_flying:
-                planar = (pose.x_m, pose.y_m, pose.yaw_rad)
-                self._add_steps(self._pose, (stamp_s,), (planar,))
-        self._pose, self._stamp_s = pose, stamp_s
-        return True
-
     def add_track(self, stamps_s: Sequence[float], poses: Sequence[Sequence[float]]) -> None:
-        """Add many poses (x_m, y_m, yaw_rad) in ``map``; the stamps increase beyond the last one.
-
-        The same as many calls of ``add_pose``, bit for bit, in a sixth of the time.
-        """
+        """Add poses (x_m, y_m, yaw_rad) in ``map``; the stamps increase beyond the last one."""
         if self._pose is None:
             self._pose, self._stamp_s = Pose2D(*poses[0]), stamps_s[0]
         if self._is_flying:
@@ -136,7 +122,7 @@ class RobotLog:
         self._pose, self._stamp_s = Pose2D(*poses[-1]), stamps_s[-1]
 
     def newer(self, stamps_s: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return the mask bool[n] of times float64[n] at which `add_pose` would use a pose."""
+        """Return the mask bool[n] of the times float64[n] that are newer than all before."""
         last_s = -np.inf if self._pose is None else self._stamp_s
         newest_s = np.maximum.accumulate(np.concatenate(([last_s], stamps_s)))
         is_newer: NDArray[np.bool_] = stamps_s > newest_s[:-1]
@@ -229,15 +215,10 @@ class FlightLog:
         self.contacts: List[Contact] = []
         self.distances = DistanceLog(names, robot_radius_m, surface_distance)
 
-    def add_pose(self, name: str, stamp_s: float, pose: Pose2D) -> None:
-        """Add a robot's pose in ``map``; ignore one that is not newer than its last."""
-        if self.robots[name].add_pose(stamp_s, pose):
-            self.distances.add(name, stamp_s, pose.x_m, pose.y_m)
-
     def add_track(
         self, name: str, stamps_s: NDArray[np.float64], poses: NDArray[np.float64]
     ) -> None:
-        """Add poses of a robot in the order in which they arrived, as calls of ``add_pose`` would.
+        """Add poses of a robot in the order in which they arrived; ignore those that are not newer.
 
         Args:
             name: Name of the robot.
@@ -252,7 +233,7 @@ class FlightLog:
             self.distances.add_tracks({name: places})
 
     def add_tracks(self, stamps_s: Sequence[float], poses: NDArray[np.float64]) -> None:
-        """Add poses of all robots, as many calls of ``add_pose`` would.
+        """Add poses of all robots at the same times.
 
         Args:
             stamps_s: Times, which increase beyond those of the poses before.

@@ -13,7 +13,7 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Tuple, Union
+from typing import Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple, Union
 
 import numpy as np
 
@@ -82,6 +82,29 @@ class GoalSequence:
             if tolerance_rad is not None:
                 return tolerance_rad
         return DEFAULT_YAW_TOLERANCE_RAD
+
+    def warnings(self, planner_m: float, planner_rad: float) -> Iterator[str]:
+        """Yield what may be a mistake in the file: tolerances that the local planner may miss.
+
+        They are no faults: the robot usually stops nearer than the planner's tolerance demands.
+
+        Args:
+            planner_m: ``xy_goal_tolerance`` of the local planner.
+            planner_rad: Its ``yaw_goal_tolerance``.
+        """
+        near_m = min(map(self.tolerance_m, self.goals))
+        turned = [goal for goal in self.goals if goal.yaw_rad is not None]
+        near_rad = min(map(self.yaw_tolerance_rad, turned), default=math.inf)
+        for value, planners, unit, name in (
+            (near_m, planner_m, "m", "xy_goal_tolerance"),
+            (near_rad, planner_rad, "rad", "yaw_goal_tolerance"),
+        ):
+            if value < planners:
+                yield (
+                    f"a tolerance of {value:g} {unit} is below the local planner's {name}, "
+                    f"{planners:g} {unit}: the quadcopter may stop outside, and the goal would be "
+                    f"skipped; expected {planners:g} {unit} or more, or a smaller {name}"
+                )
 
 
 SETTINGS: Dict[str, Setting] = {

@@ -163,9 +163,6 @@ class VoronoiCell(CommandFilter):
 
     def filter(self, command: Command, situation: Situation) -> Command:
         """Return the command, slower if it would leave the cell."""
-        limited = situation.peers.limit(
-            situation.map_pose, situation.velocity, command.velocity, situation.period_s
-        )
-        if not limited.limited_by:
-            return command
-        return Command(limited.command, command.stop, limited.limited_by)
+        cell = situation.peers.cell(situation.map_pose, situation.velocity, situation.period_s)
+        velocity, limited_by = cell.limit(command.velocity)
+        return Command(velocity, command.stop, limited_by) if limited_by else command

@@ -10,13 +10,12 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
-from typing import Any, Optional
+from typing import Optional
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.control.controller import LocalPlanner
-from quad_nav.control.escape import escape
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.errors import ControlError
 from quad_nav.geometry import Pose2D, Twist2D
@@ -55,58 +54,6 @@ class StuckAction(enum.Enum):
     RECOVER = "recover"
 
 
-class ProgressChecker:
-    """Measures how long a robot has made no progress."""
-
-    def __init__(self) -> None:
-        """Create a checker that does not run yet."""
-        self._stall_timer = StallTimer()
-        self._has_replanned = False
-
-    def restart(self, now_s: float) -> None:
-        """Set the elapsed time to zero."""
-        self._stall_timer.restart(now_s)
-
-    def reset(self, now_s: float) -> None:
-        """Set the elapsed time to zero and start with a new plan again."""
-        self.restart(now_s)
-        self._has_replanned = False
-
-    def check(self, now_s: float, pose: Pose2D, params: ProgressParams) -> StuckAction:
-        """Return the reaction that is due; the time restarts after each."""
-        if self._stall_timer.has_moved(now_s, pose, params.distance_m):
-            self._has_replanned = False
-        if not self._stall_timer.exceeds(now_s, params.timeout_s):
-            return StuckAction.NONE
-        self._stall_timer.restart(now_s)
-        if self._has_replanned:
-            return StuckAction.RECOVER
-        self._has_replanned = True
-        return StuckAction.REPLAN
-
-
-def relaxed_obstacle_weight(
-    params: Any, factor: float, distance_m: float
-) -> Optional[ParameterLimit]:
-    """Return a limit that relaxes the obstacle weight of a local planner.
-
-    A robot that spins in place has usually found that obstacle costs outweigh all progress.
-    Trajectories that collide stay illegal.
-
-    Args:
-        params: Parameters of the local planner.
-        factor: Factor of ``occdist_scale``.
-        distance_m: The limit ends when the robot has moved so far.
-
-    Returns:
-        The limit; None for a factor of 1 or a planner without ``occdist_scale``.
-    """
-    weight = getattr(params, "occdist_scale", None)
-    if weight is None or factor >= 1.0:
-        return None
-    return ParameterLimit((("occdist_scale", factor * weight),), distance_m)
-
-
 class ControlSupervisor:
     """Runs the local planner of one robot.
 
@@ -125,8 +72,8 @@ class ControlSupervisor:
 
     def reset(self) -> None:
         """Forget all progress, for another goal."""
-        self._oscillation = StallTimer()
-        self._progress = ProgressChecker()
+        self._oscillation, self._progress = StallTimer(), StallTimer()
+        self._has_replanned = False
 
     def start(self, now_s: float) -> None:
         """Count the patience from now, for another goal."""
@@ -141,7 +88,8 @@ class ControlSupervisor:
     def end_recovery(self, now_s: float) -> None:
         """Restart the stall timers after a recovery behaviour."""
         self._oscillation.restart(now_s)
-        self._progress.reset(now_s)
+        self._progress.restart(now_s)
+        self._has_replanned = False
 
     def track(self, now_s: float, pose: Pose2D, oscillation_distance_m: float) -> bool:
         """Update limits and timers by the robot's pose; return whether it does not oscillate."""
@@ -164,33 +112,40 @@ class ControlSupervisor:
     def check_progress(
         self, tick: Tick, pose: Pose2D, params: ProgressParams, oscillation_distance_m: float
     ) -> StuckAction:
-        """Check the progress; warn and relax the obstacle weight of a robot without it."""
-        action = self._progress.check(tick.now_s, pose, params)
-        if action is StuckAction.NONE:
-            return action
+        """Return what is due for missing progress; warn of it. The time restarts after each."""
+        if self._progress.has_moved(tick.now_s, pose, params.distance_m):
+            self._has_replanned = False
+        if not self._progress.exceeds(tick.now_s, params.timeout_s):
+            return StuckAction.NONE
+        self._progress.restart(tick.now_s)
         stall = f"no progress for {params.timeout_s:g} s at ({pose.x_m:.2f}, {pose.y_m:.2f})"
-        if action is StuckAction.RECOVER:
+        if self._has_replanned:
             tick.warnings.append(f"{stall} after replanning, starting recoveries")
-            return action
+            return StuckAction.RECOVER
+        self._has_replanned = True
         tick.warnings.append(f"{stall}, replanning")
-        limit = relaxed_obstacle_weight(
-            self.limiter.usual, params.stuck_cost_factor, oscillation_distance_m
+        self._relax_obstacle_weight(
+            params.stuck_cost_factor, pose, tick.now_s, oscillation_distance_m
         )
-        if limit is not None:
-            self.limiter.impose(limit, pose, tick.now_s)
-        return action
+        return StuckAction.REPLAN
+
+    def _relax_obstacle_weight(
+        self, factor: float, pose: Pose2D, now_s: float, distance_m: float
+    ) -> None:
+        """Lower the ``occdist_scale`` of a planner that has one until the robot has moved so far.
+
+        A robot that spins in place has usually found that obstacle costs outweigh all progress.
+        Trajectories that collide stay illegal.
+        """
+        weight = getattr(self.limiter.usual, "occdist_scale", None)
+        if weight is not None and factor < 1.0:
+            limit = ParameterLimit((("occdist_scale", factor * weight),), distance_m)
+            self.limiter.impose(limit, pose, now_s)
 
     def compute_velocity(
         self, tick: Tick, costmap: LayeredCostmap, poses: RobotPoses, velocity: Twist2D
     ) -> bool:
-        """Compute a command; return False and warn if the local planner has none.
-
-        Args:
-            tick: The step; it takes command and warning.
-            costmap: The local costmap.
-            poses: Poses of the robot in the costmaps' frames.
-            velocity: Velocity of the robot, in its own frame.
-        """
+        """Compute the tick's command; return False and warn if the local planner has none."""
         local_from_global = poses.local_from_global
         assert poses.in_local is not None and local_from_global is not None
         try:
@@ -207,8 +162,3 @@ class ControlSupervisor:
     def is_patience_exhausted(self, now_s: float, patience_s: float) -> bool:
         """Return whether the local planner has had no command for too long."""
         return now_s > self._last_valid_s + patience_s
-
-
-def escape_command(costmap: LayeredCostmap, pose: Pose2D) -> Twist2D:
-    """Return the command that leads a robot in collision to lower costs, else a stop."""
-    return escape(costmap.spec, costmap.costs, costmap.footprint, pose) or Twist2D()

@@ -14,7 +14,7 @@ class CostmapUpdates:
 
     def __init__(self, global_costmap: LayeredCostmap, local_costmap: LayeredCostmap) -> None:
         """Create schedules that have not started."""
-        self._global, self._local = global_costmap, local_costmap
+        self._local = local_costmap
         self._costmaps: Dict[str, Tuple[LayeredCostmap, Schedule]] = {
             "global": (global_costmap, Schedule(global_costmap.params.update_frequency_hz)),
             "local": (local_costmap, Schedule(local_costmap.params.update_frequency_hz)),
@@ -43,17 +43,6 @@ class CostmapUpdates:
                 tick.warnings.append(f"{name} costmap not updated: robot pose unknown")
                 continue
             tick.windows[name] = costmap.update(tick.now_s, pose)
-
-    def clear(self, now_s: float) -> None:
-        """Reset the layers of both costmaps, as the service ``~clear_costmaps`` does."""
-        self._global.reset_layers(now_s)
-        self._local.reset_layers(now_s)
-
-    def free_square(self, poses: RobotPoses, radius_m: float) -> None:
-        """Mark the square around the robot as free until the next updates."""
-        for costmap, pose in ((self._global, poses.in_global), (self._local, poses.in_local)):
-            if pose is not None:
-                costmap.free_square(pose.x_m, pose.y_m, 2.0 * radius_m)
 
     def outdated_reason(self, now_s: float) -> str:
         """Return why the local costmap is out of date, "" if it is current."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.control.controller import LocalPlanner
+from quad_nav.costmap.cost_grid import Square
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.map_edge import closed_edge
 from quad_nav.costmap.tracks import Tracks
@@ -65,18 +66,7 @@ class Navigator(StateMachine):
         peers: PeerCoordinator,
         filters: Sequence[CommandFilter] = (),
     ) -> None:
-        """Create an idle navigator.
-
-        Args:
-            params: The parameters.
-            global_costmap: Costmap of the global planner.
-            local_costmap: Costmap of the local planner.
-            planner: The global planner.
-            controller: The local planner.
-            recoveries: The recovery behaviours in the order in which they run.
-            peers: Coordination with the other robots.
-            filters: The command filters in their order.
-        """
+        """Create an idle navigator; recoveries and filters are in the order in which they run."""
         self.global_costmap, self.local_costmap = global_costmap, local_costmap
         self.controller = controller
         self.peers = peers
@@ -306,11 +296,15 @@ class Navigator(StateMachine):
 
     def clear_costmaps(self, now_s: float) -> None:
         """Reset the layers of both costmaps, as the service ``~clear_costmaps`` does."""
-        self._updates.clear(now_s)
+        self.global_costmap.reset_layers(now_s)
+        self.local_costmap.reset_layers(now_s)
 
     def free_surroundings(self, poses: RobotPoses, radius_m: float) -> None:
         """Mark the square around the robot as free until the next updates."""
-        self._updates.free_square(poses, radius_m)
+        costmaps = self.global_costmap, self.local_costmap
+        for costmap, pose in zip(costmaps, (poses.in_global, poses.in_local)):
+            if pose is not None:
+                costmap.free_square(Square(pose.x_m, pose.y_m, 2.0 * radius_m))
 
     # -- planning ------------------------------------------------------------------------
 
@@ -319,13 +313,8 @@ class Navigator(StateMachine):
     ) -> NDArray[np.float64]:
         """Plan between two poses without flying, as the service ``~make_plan`` does.
 
-        Args:
-            start: Start pose in the global costmap's frame.
-            goal: Goal pose in the same frame.
-            tolerance_m: Distance from the goal at which the plan may end.
-
         Returns:
-            The plan, float64[n, 3] of (x_m, y_m, yaw_rad) in the same frame.
+            The plan, float64[n, 3] of (x_m, y_m, yaw_rad) in the global costmap's frame.
 
         Raises:
             PlanningError: There is no plan, not even within the tolerance of the goal.

@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 from typing import Optional
 
+from quad_nav.control.escape import escape
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.map_edge import closed_edge
 from quad_nav.errors import PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.navigator.command_filter import StopReason
-from quad_nav.navigator.control_supervisor import ControlSupervisor, StuckAction, escape_command
+from quad_nav.navigator.control_supervisor import ControlSupervisor, StuckAction
 from quad_nav.navigator.costmap_updates import CostmapUpdates
 from quad_nav.navigator.params import NavigatorParams
 from quad_nav.navigator.plan_search import PlanSearch
@@ -48,18 +49,7 @@ class StateMachine:
         recovery: RecoverySequence,
         peers: PeerCoordinator,
     ) -> None:
-        """Create an idle state machine.
-
-        Args:
-            params: The parameters.
-            global_costmap: Costmap of the global planner.
-            local_costmap: Costmap of the local planner.
-            updates: Updates of both costmaps.
-            planner: The global planner.
-            control: Supervisor of the local planner.
-            recovery: The recovery behaviours.
-            peers: Coordination with the other robots.
-        """
+        """Create an idle state machine of these parts."""
         self.params = params
         self.planner = planner
         self.state = State.IDLE
@@ -122,13 +112,7 @@ class StateMachine:
         return is_due(self._cycle.due_s, now_s)
 
     def run(self, tick: Tick, poses: RobotPoses, velocity: Twist2D) -> None:
-        """Do what is due for the goal: search a plan, recover, control.
-
-        Args:
-            tick: The step; it takes the results.
-            poses: Poses of the robot in the costmaps' frames.
-            velocity: Velocity of the odometry, in the robot's frame.
-        """
+        """Do what is due for the goal: search a plan, recover, control. The tick has it all."""
         self._cycle.set_frequency(self.params.controller_frequency_hz, tick.now_s)
         self._search.set_frequency(self.params.planner_frequency_hz, tick.now_s)
         if self._is_search_due(tick.now_s):
@@ -261,7 +245,9 @@ class StateMachine:
         else:
             tick.halt(StopReason.NO_TRAJECTORY)
             if params.escape_collision:
-                tick.steer(escape_command(self._local, poses.in_local))
+                local = self._local
+                way_out = escape(local.spec, local.costs, local.footprint, poses.in_local)
+                tick.steer(way_out or Twist2D())
             self._begin_planning(tick.now_s)
 
     # -- peers ---------------------------------------------------------------------------

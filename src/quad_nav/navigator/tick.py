@@ -13,18 +13,10 @@ from quad_nav.control.controller import Control
 from quad_nav.costmap.cost_grid import Window
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.navigator.command_filter import StopReason
+from quad_nav.navigator.state import State as State
 from quad_nav.peers.right_of_way import YieldDecision
 
 _SAME_FRAME = Pose2D(0.0, 0.0, 0.0)
-
-
-class State(enum.Enum):
-    """States of move_base."""
-
-    IDLE = "idle"
-    PLANNING = "planning"
-    CONTROLLING = "controlling"
-    CLEARING = "clearing"
 
 
 class Trigger(enum.Enum):

@@ -6,8 +6,7 @@ yields, and every command stays inside the robot's own Voronoi cell. ``docs/peer
 describes the layers.
 
 Reading order: ``peer`` (what a robot knows of another), ``peer_tracker`` (which peers matter),
-``predicted_paths`` and ``peer_costs`` (peers in the costmaps), ``right_of_way`` (who yields),
-``holding_point`` (where to yield to), ``yielding`` (yield, and for how long), ``voronoi_cell``
-(safe commands), and
-``coordinator``, which the navigator asks: observe, decide, limit.
+``peer_costs`` (peers in the costmaps), ``right_of_way`` (who yields), ``holding_point`` (where to
+yield to), ``yielding`` (yield, and for how long), ``voronoi_cell`` (safe commands), and
+``coordinator``, which the navigator asks: observe, decide, cell.
 """

@@ -1,8 +1,8 @@
 """Coordination of one robot with its peers.
 
 The navigator asks three things: ``observe`` updates the peers, ``decide`` says whether the robot
-yields, ``limit`` keeps a command inside the robot's Voronoi cell. A robot without a goal yields by
-a manoeuvre: to a holding point, and back.
+yields, ``cell`` is the robot's Voronoi cell, inside of which commands are safe. A robot without a
+goal yields by a manoeuvre: to a holding point, and back.
 """
 
 from __future__ import annotations
@@ -16,21 +16,14 @@ from numpy.typing import NDArray
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.tracks import Tracks
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.peers.peer import (
-    IDLE_PRIORITY,
-    NO_PATH,
-    Intention,
-    Peer,
-    priority_of,
-    resample,
-)
+from quad_nav.peers.peer import IDLE_PRIORITY, NO_PATH, Intention, Peer, priority_of, resample
 from quad_nav.peers.peer_costs import PeerCosts
 from quad_nav.peers.peer_params import PeerParams
 from quad_nav.peers.peer_tracker import PeerTracker
 from quad_nav.peers.right_of_way import MOVING_OBSTACLE, Yield, YieldDecision
 from quad_nav.peers.roundabout import Roundabout
 from quad_nav.peers.stand_off import StandOff
-from quad_nav.peers.voronoi_cell import LimitedCommand, limit_to_cell, limited_velocities
+from quad_nav.peers.voronoi_cell import Cell
 from quad_nav.peers.yielding import YieldRules
 from quad_nav.timing import StallTimer
 
@@ -238,12 +231,9 @@ class PeerCoordinator:
     # -- decide --------------------------------------------------------------------------
 
     def decide(self, now_s: float, pose: Pose2D, goal: Optional[Pose2D]) -> PeerAdvice:
-        """Decide whether the robot yields; ``decision`` holds the result.
+        """Decide whether a robot with a goal in ``map``, or an idle one, yields.
 
-        Args:
-            now_s: Time of the decision.
-            pose: Pose of the robot in ``map``.
-            goal: Goal of the robot in ``map``, None if it is idle.
+        ``decision`` holds the result.
         """
         if goal is None:
             return self._decide_idle(now_s, pose)
@@ -305,51 +295,20 @@ class PeerCoordinator:
 
     # -- limit ---------------------------------------------------------------------------
 
-    def limit(
-        self, pose: Pose2D, velocity: Twist2D, command: Twist2D, control_period_s: float
-    ) -> LimitedCommand:
-        """Limit a command to the robot's Voronoi cell.
+    def cell(self, pose: Pose2D, velocity: Twist2D, control_period_s: float) -> Cell:
+        """Return the robot's Voronoi cell, inside of which its commands are safe.
+
+        Where moving obstacles are tracked, a peer that went silent a moment ago bounds it, too.
 
         Args:
             pose: Pose of the robot in ``map``.
             velocity: Current velocity in the robot's frame.
-            command: Commanded velocity in the robot's frame.
             control_period_s: Period of commands; the next one may come later by a latency.
         """
-        return limit_to_cell(
-            pose,
-            velocity,
-            command,
-            self._cell_peers,
-            self._tracker.safety_radius_m,
-            control_period_s + LATENCY_S,
-        )
-
-    def limit_velocities(
-        self,
-        velocities: NDArray[np.float64],
-        pose: Pose2D,
-        velocity: Twist2D,
-        control_period_s: float,
-    ) -> NDArray[np.float64]:
-        """Return what the cell leaves of commands, float64[c, 2], along the axes of ``map``.
-
-        Other arguments are as for ``limit``.
-        """
-        return limited_velocities(
-            velocities,
-            pose,
-            velocity,
-            self._cell_peers,
-            self._tracker.safety_radius_m,
-            control_period_s + LATENCY_S,
-        )
-
-    @property
-    def _cell_peers(self) -> List[Peer]:
-        """Peers that bound the robot's Voronoi cell."""
         tracker = self._tracker
-        return [*tracker.peers, *tracker.silent] if self._tracks else tracker.peers
+        peers = [*tracker.peers, *tracker.silent] if self._tracks else tracker.peers
+        hold_s = control_period_s + LATENCY_S
+        return Cell(pose, velocity, peers, tracker.safety_radius_m, hold_s)
 
     def is_blocked(self, now_s: float, pose: Pose2D) -> bool:
         """Return whether limited commands have kept the robot in place; then restart the count.

@@ -8,17 +8,18 @@ from typing import Optional, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.costmap.cost_grid import costmap_view
 from quad_nav.costmap.cost_grid_kernel import nearest_cell, raise_discs
+from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.geometry import Pose2D
-from quad_nav.grid import INSCRIBED, GridSpec
+from quad_nav.grid import INSCRIBED
 from quad_nav.peers.peer import resample
 
 COMFORTABLE = 128  # below this cost a robot has room to turn
 
 
 def find_holding_point(
-    spec: GridSpec,
-    costs: NDArray[np.uint8],
+    costmap: LayeredCostmap,
     pose: Pose2D,
     paths: Sequence[NDArray[np.float64]],
     peers: NDArray[np.float64],
@@ -27,8 +28,7 @@ def find_holding_point(
     """Find the nearest place that keeps the minimum separation from all paths and peers.
 
     Args:
-        spec: Geometry of the global costmap.
-        costs: Costs of the global costmap, uint8[H, W].
+        costmap: The global costmap.
         pose: Pose of the robot in ``map``.
         paths: Paths to keep clear, float64[n, 2] each, metres in ``map``, from the present
             positions of their robots on.
@@ -39,15 +39,15 @@ def find_holding_point(
     Returns:
         The holding point, facing away from the robot; None if no such place is reachable.
     """
+    spec, costs = costmap.spec, costmap.costs
     start = spec.cell_of(pose.x_m, pose.y_m)
     if start is None:
         return None
     occupied = (costs >= COMFORTABLE).astype(np.uint8)
-    grid = (spec.origin_x_m, spec.origin_y_m, spec.resolution_m)
-    raise_discs(occupied, *grid, peers, min_separation_m, 1)
-    for path in paths:
-        raise_discs(occupied, *grid, resample(path, 2.0 * spec.resolution_m), min_separation_m, 1)
-    blocked = _impassable(spec, costs, pose, peers, min_separation_m)
+    kept_clear = [peers, *(resample(path, 2.0 * spec.resolution_m) for path in paths)]
+    for centres in kept_clear:
+        raise_discs(costmap_view(spec, occupied), centres, min_separation_m, 1)
+    blocked = _impassable(costmap, pose, peers, min_separation_m)
     cell_x, cell_y = nearest_cell(blocked, occupied, *start)
     if cell_x < 0:
         return None
@@ -56,8 +56,7 @@ def find_holding_point(
 
 
 def is_reachable(
-    spec: GridSpec,
-    costs: NDArray[np.uint8],
+    costmap: LayeredCostmap,
     pose: Pose2D,
     target: Pose2D,
     peers: NDArray[np.float64],
@@ -67,33 +66,24 @@ def is_reachable(
 
     The arguments are those of ``find_holding_point``.
     """
+    spec = costmap.spec
     start, end = spec.cell_of(pose.x_m, pose.y_m), spec.cell_of(target.x_m, target.y_m)
     if start is None or end is None:
         return False
     occupied = np.ones(spec.shape, dtype=np.uint8)
     occupied[end[1], end[0]] = 0
-    blocked = _impassable(spec, costs, pose, peers, min_separation_m)
+    blocked = _impassable(costmap, pose, peers, min_separation_m)
     return bool(nearest_cell(blocked, occupied, *start)[0] >= 0)
 
 
 def _impassable(
-    spec: GridSpec,
-    costs: NDArray[np.uint8],
-    pose: Pose2D,
-    peers: NDArray[np.float64],
-    min_separation_m: float,
+    costmap: LayeredCostmap, pose: Pose2D, peers: NDArray[np.float64], min_separation_m: float
 ) -> NDArray[np.uint8]:
     """Return the cells that no path may cross, uint8[H, W]; the robot is in none of them."""
-    blocked: NDArray[np.uint8] = (costs >= INSCRIBED).astype(np.uint8)
+    spec = costmap.spec
+    blocked: NDArray[np.uint8] = (costmap.costs >= INSCRIBED).astype(np.uint8)
     for peer in peers:
         distance_m = math.hypot(peer[0] - pose.x_m, peer[1] - pose.y_m)
-        raise_discs(
-            blocked,
-            spec.origin_x_m,
-            spec.origin_y_m,
-            spec.resolution_m,
-            peer[None, :],
-            min(min_separation_m, distance_m - 2.0 * spec.resolution_m),
-            1,
-        )
+        radius_m = min(min_separation_m, distance_m - 2.0 * spec.resolution_m)
+        raise_discs(costmap_view(spec, blocked), peer[None, :], radius_m, 1)
     return blocked

@@ -25,12 +25,8 @@ _EXTRAPOLATION_S = 5.0
 def priority_of(goal_set_s: float, number: int) -> float:
     """Return the priority of a robot with a goal; the higher one goes first.
 
-    The robot with the older goal goes first. A hundredth of a second for each robot number
-    decides between goals that are set together.
-
-    Args:
-        goal_set_s: Time at which the goal was set.
-        number: Number of the robot.
+    The robot with the older goal goes first. A hundredth of a second for each robot number decides
+    between goals that are set together.
     """
     return -(goal_set_s + _NUMBER_S * number)
 
@@ -139,15 +135,7 @@ def assumed_intention(peer: Peer) -> Intention:
 
 
 def resample(path: NDArray[np.float64], spacing_m: float) -> NDArray[np.float64]:
-    """Resample a path with a point about every ``spacing_m``; both ends stay.
-
-    Args:
-        path: float64[n, 2] in metres.
-        spacing_m: Distance of the points along the path.
-
-    Returns:
-        float64[k, 2] in metres, in the same frame.
-    """
+    """Resample a path, float64[n, 2], with a point about every ``spacing_m``; both ends stay."""
     if len(path) < 2:
         return path
     lengths = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))))

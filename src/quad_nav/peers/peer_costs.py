@@ -14,14 +14,14 @@ from typing import List
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.costmap.cost_grid import Square
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.peer_layer import PeerArea, PeerLayer
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import LETHAL
 from quad_nav.peers.peer_tracker import TOLERANCE_M, PeerTracker
-from quad_nav.peers.predicted_paths import reached_in_time
-from quad_nav.peers.right_of_way import HORIZON_S, TIME_TOLERANCE_S, predict_peer
+from quad_nav.peers.right_of_way import HORIZON_S, TIME_TOLERANCE_S, places_reached, predict_peer
 from quad_nav.peers.roundabout import Roundabout
 
 _SAME_FRAME = Pose2D(0.0, 0.0, 0.0)
@@ -46,13 +46,7 @@ class PeerCosts:
         self._global, self._local = global_costmap, local_costmap
 
     def update(self, pose: Pose2D, local_from_global: Pose2D, priority: float) -> None:
-        """Update the layers; they take effect with the costmaps' next update.
-
-        Args:
-            pose: Pose of the robot in ``map``.
-            local_from_global: Transform from ``map`` to the frame of the local costmap.
-            priority: Priority of the robot.
-        """
+        """Update the layers; they take effect with the costmaps' next update."""
         peers = self._tracker.peers
         newcomers = [k for k, peer in enumerate(peers) if peer.name in self._tracker.newcomers]
         self._tracker.newcomers = []
@@ -73,20 +67,15 @@ class PeerCosts:
                 elif isinstance(layer, ObstacleLayer):
                     layer.excluded_circles = circles
                     for x_m, y_m, _ in circles[newcomers].tolist():  # marked until now
-                        layer.free_square(x_m, y_m, 2.0 * radius_m)
+                        layer.free_square(Square(x_m, y_m, 2.0 * radius_m))
 
     def _areas(
         self, positions: NDArray[np.float64], pose: Pose2D, priority: float
     ) -> List[PeerArea]:
         """Return the areas of the global costmap: stationary peers, paths that go first, circles.
 
-        Of a path only those places count that the robot can reach before the peer has passed
-        them: so it plans to pass behind the peer.
-
-        Args:
-            positions: Of the peers, float64[n, 2] in ``map``.
-            pose: Pose of the robot in ``map``.
-            priority: Priority of the robot.
+        Of a path only those places count that the robot can reach before the peer has passed them:
+        so it plans to pass behind the peer. The peers are at positions float64[n, 2] in ``map``.
         """
         tracker = self._tracker
         radius_m = tracker.min_separation_m + TOLERANCE_M
@@ -96,7 +85,8 @@ class PeerCosts:
                 areas.append(PeerArea(positions[k : k + 1], radius_m, _STATIONARY_COST))
             elif peer.intention.priority > priority and peer.name not in self._roundabout.members:
                 path = predict_peer(peer, tracker.cruise_mps, _PATH_TIMES_S)
-                met = places_met(path, _PATH_TIMES_S, pose, radius_m, tracker.cruise_mps)
+                at, speed_mps = (pose.x_m, pose.y_m), tracker.cruise_mps
+                met = places_reached(path, _PATH_TIMES_S, at, radius_m, speed_mps, TIME_TOLERANCE_S)
                 areas += [PeerArea(met, radius_m, _PATH_COST)] if len(met) else []
         if self._roundabout.centre is not None:
             barrier = self._roundabout.barrier(pose)
@@ -109,12 +99,8 @@ class PeerCosts:
         """Return the obstacles of the local costmap: stationary peers, and a circle.
 
         They keep the robot's centre off. No area contains the robot itself, because then no
-        trajectory would be legal.
-
-        Args:
-            positions: Of the peers, float64[n, 2] in the frame of the local costmap.
-            pose: Pose of the robot in ``map``.
-            local_from_global: Transform from ``map`` to the frame of the local costmap.
+        trajectory would be legal. The peers are at positions float64[n, 2] in the local costmap's
+        frame.
         """
         tracker, here = self._tracker, (pose.x_m, pose.y_m)
         kept_off = [
@@ -132,23 +118,3 @@ class PeerCosts:
             if radius_m > 0.0:
                 obstacles.append(PeerArea(place[None, :], radius_m, LETHAL))
         return obstacles
-
-
-def places_met(
-    path: NDArray[np.float64],
-    times_s: NDArray[np.float64],
-    pose: Pose2D,
-    radius_m: float,
-    cruise_mps: float,
-) -> NDArray[np.float64]:
-    """Return the places of a peer, float64[m, 2], that the robot can reach before it has passed.
-
-    Args:
-        path: Positions of the peer, float64[k, 2] in ``map``.
-        times_s: Times from now at which the peer is there, float64[k].
-        pose: Pose of the robot in ``map``.
-        radius_m: Distance from a place within which the robot is at it.
-        cruise_mps: Speed of the robot.
-    """
-    robot = (pose.x_m, pose.y_m)
-    return reached_in_time(path, times_s, robot, radius_m, cruise_mps, TIME_TOLERANCE_S)

@@ -34,9 +34,7 @@ class PeerTracker:
     def __init__(self, global_costmap: LayeredCostmap, local_costmap: LayeredCostmap) -> None:
         """Create a tracker without peers.
 
-        Args:
-            global_costmap: Costmap in ``map``; its obstacle layers extend the reach.
-            local_costmap: Costmap with the footprint of the robot; extends the reach as well.
+        Obstacle layers of both costmaps extend its reach; the local one has the robot's footprint.
         """
         self._local = local_costmap
         self._obstacle_layers = [
@@ -68,14 +66,7 @@ class PeerTracker:
         margin_m: float,
         timeout_s: float,
     ) -> List[str]:
-        """Update the peers.
-
-        Args:
-            now_s: Time of the update.
-            pose: Pose of the robot in ``map``, None if unknown.
-            peers: All peers with a known pose, however old.
-            margin_m: Distance from footprint to bisector.
-            timeout_s: Age from which a state is ignored.
+        """Update the peers from all with a known pose; those older than a time-out are lost.
 
         Returns:
             Messages about peers that were lost or came back.

@@ -12,15 +12,16 @@ in conflict if they pass the same place within ``TIME_TOLERANCE_S`` of each othe
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass
 from typing import Container, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.kernel_cache import njit
 from quad_nav.geometry import Pose2D
 from quad_nav.peers.peer import Peer
-from quad_nav.peers.predicted_paths import nearest_in_time, sample_path
 
 MOVING_OBSTACLE = "a moving obstacle"
 """Name of what moves and has no name, and that a robot makes room for."""
@@ -133,19 +134,10 @@ def predict_positions(
     speed_mps: float,
     times_s: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Predict the positions of a robot that follows a path at constant speed.
+    """Predict the positions, float64[k, 2], of a robot that follows a path at constant speed.
 
-    The robot moves from ``start`` to the nearest point of the path and along it; it stays at
-    the end.
-
-    Args:
-        start: float64[2], metres in ``map``.
-        path: float64[n, 2], metres in ``map``.
-        speed_mps: Speed along the path.
-        times_s: float64[k], times from now.
-
-    Returns:
-        float64[k, 2], metres in ``map``.
+    The robot moves from ``start`` to the nearest point of the path, float64[n, 2] in ``map``, and
+    along it; it stays at the end. Times from now are float64[k].
     """
     if not len(path):
         return np.repeat(start[None, :], len(times_s), axis=0)
@@ -169,3 +161,78 @@ def _conflict(
     now_m = nearest_in_time(own[:1], theirs[:1], 0)
     nearest_m = nearest_in_time(own, theirs, _STEPS_APART)
     return bool(nearest_m < min(min_separation_m, now_m - _NEARER_M))
+
+
+@njit(cache=True, nogil=True)
+def sample_path(
+    start: NDArray[np.float64], path: NDArray[np.float64], travelled: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the points, float64[k, 2], of a path after distances travelled from a start.
+
+    The path, float64[n, 2], n >= 1, joins at the point after the nearest one. Beyond its end every
+    point is the end.
+    """
+    nearest, nearest2 = 0, np.inf
+    for k in range(path.shape[0]):
+        distance2 = (path[k, 0] - start[0]) ** 2 + (path[k, 1] - start[1]) ** 2
+        if distance2 < nearest2:
+            nearest, nearest2 = k, distance2
+    first = min(nearest + 1, path.shape[0] - 1)
+    lengths = np.empty(path.shape[0])  # of the stretch to each point
+    x, y = start[0], start[1]
+    for k in range(first, path.shape[0]):
+        dx, dy = path[k, 0] - x, path[k, 1] - y
+        lengths[k] = math.sqrt(dx * dx + dy * dy)
+        x, y = path[k, 0], path[k, 1]
+    points = np.empty((travelled.shape[0], 2))
+    for i in range(travelled.shape[0]):
+        left = travelled[i]
+        x, y = start[0], start[1]
+        for k in range(first, path.shape[0]):
+            if left < lengths[k]:
+                x += (path[k, 0] - x) * (left / lengths[k])
+                y += (path[k, 1] - y) * (left / lengths[k])
+                break
+            left -= lengths[k]
+            x, y = path[k, 0], path[k, 1]
+        points[i, 0], points[i, 1] = x, y
+    return points
+
+
+@njit(cache=True, nogil=True)
+def nearest_in_time(
+    one: NDArray[np.float64], other: NDArray[np.float64], steps_apart: int
+) -> float:
+    """Return the least distance of two tracks, float64[k, 2], at about the same time.
+
+    Positions are at equal steps of time; so many steps apart they still count.
+    """
+    nearest_m = np.inf
+    for i in range(one.shape[0]):
+        for j in range(max(0, i - steps_apart), min(other.shape[0], i + steps_apart + 1)):
+            distance_m = math.hypot(one[i, 0] - other[j, 0], one[i, 1] - other[j, 1])
+            nearest_m = min(nearest_m, distance_m)
+    return nearest_m
+
+
+@njit(cache=True, nogil=True)
+def places_reached(
+    path: NDArray[np.float64],
+    times: NDArray[np.float64],
+    robot: Tuple[float, float],
+    radius: float,
+    speed: float,
+    tolerance: float,
+) -> NDArray[np.float64]:
+    """Return the positions of a peer that a robot can reach until the peer has passed them.
+
+    The peer is at float64[k, 2] at times from now, float64[k], and has passed a tolerance later.
+    The robot is at a place within a radius of it.
+    """
+    reached, m = np.empty_like(path), 0
+    for k in range(path.shape[0]):
+        away = math.hypot(path[k, 0] - robot[0], path[k, 1] - robot[1]) - radius
+        if away <= speed * (times[k] + tolerance):
+            reached[m, 0], reached[m, 1] = path[k, 0], path[k, 1]
+            m += 1
+    return reached[:m]

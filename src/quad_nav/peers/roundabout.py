@@ -16,7 +16,7 @@ IEEE Transactions on Robotics 23(6), 2007. There each vehicle has a circle of it
 from __future__ import annotations
 
 import math
-from typing import FrozenSet, List, Optional, Sequence
+from typing import FrozenSet, List, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +24,15 @@ from numpy.typing import NDArray
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.geometry import Pose2D
 from quad_nav.peers.holding_point import COMFORTABLE
-from quad_nav.peers.meetings import find_meetings, reach_m
 from quad_nav.peers.peer import HIGHEST_PRIORITY, Peer
 from quad_nav.peers.peer_tracker import TOLERANCE_M, PeerTracker
 from quad_nav.timing import StallTimer
 
 Floats = NDArray[np.float64]
 
+_HORIZON_S = 30.0  # of meetings
+_NEARER_M = 0.05  # an approach by less does not count
+_SAME_TIME_S = 3.0
 _FEWEST_PEERS = 3
 _PERIOD_S = 1.0  # of looking for meetings
 _REACTION_S = 0.6  # for which the cells expect a robot to go on: period, latency and coasting
@@ -53,12 +55,7 @@ class Roundabout:
     """
 
     def __init__(self, tracker: PeerTracker, global_costmap: LayeredCostmap) -> None:
-        """Create no roundabout yet.
-
-        Args:
-            tracker: The peers and their distances.
-            global_costmap: Costmap in which a circle has to be free.
-        """
+        """Create no roundabout yet; a circle has to be free in the global costmap."""
         self._tracker = tracker
         self._global = global_costmap
         self.start(None)
@@ -77,7 +74,7 @@ class Roundabout:
     @property
     def reach_m(self) -> float:
         """Distance up to which peers matter to the next update."""
-        return reach_m(self._tracker.cruise_mps) if self._is_due else 0.0
+        return 2.0 * self._tracker.cruise_mps * _HORIZON_S if self._is_due else 0.0
 
     def restart(self) -> None:
         """Forget everything but the goal, after a jump of the clock."""
@@ -86,13 +83,7 @@ class Roundabout:
     def update(
         self, now_s: float, pose: Pose2D, peers: Sequence[Peer], timeout_s: float
     ) -> List[str]:
-        """Enter, keep or leave a roundabout.
-
-        Args:
-            now_s: Time of the update.
-            pose: Pose of the robot in ``map``.
-            peers: All peers within ``reach_m`` with a known pose.
-            timeout_s: Age from which a state is ignored.
+        """Enter, keep or leave a roundabout, by all peers within ``reach_m`` with a known pose.
 
         Returns:
             Messages for the log.
@@ -119,10 +110,7 @@ class Roundabout:
         return [f"{text}, as do {len(self.members)} peers"]
 
     def barrier(self, pose: Pose2D) -> Floats:
-        """Return the discs of ``radius_m`` that plans avoid, so that they keep right.
-
-        Args:
-            pose: Pose of the robot in ``map``.
+        """Return discs of ``radius_m`` that plans avoid, so that they keep right.
 
         Returns:
             float64[k, 2], centres in ``map``: the circle and what is to the left of it.
@@ -199,3 +187,51 @@ def _crosses(at: Floats, to: Floats, centre: Floats, radius_m: float) -> bool:
     ahead_m = float((centre - at) @ along)
     left_m = float((centre - at) @ (-along[1], along[0]))
     return ahead_m > -_PASSED_M and left_m < _CLEAR_FACTOR * radius_m
+
+
+def find_meetings(
+    start: Floats, goal: Floats, starts: Floats, goals: Floats, speed_mps: float, distance_m: float
+) -> Tuple[NDArray[np.int64], Floats]:
+    """Find the place where a robot meets most of its peers at about the same time.
+
+    Args:
+        start: float64[2], position of the robot, metres.
+        goal: float64[2], its goal.
+        starts: float64[n, 2], positions of the peers.
+        goals: float64[n, 2], their goals.
+        speed_mps: Speed of all of them.
+        distance_m: Robots that come nearer than this, and nearer than they are, meet.
+
+    Returns:
+        Indices of the peers that are met there, int64[m], and the places half-way between robot
+        and peer where each is nearest, float64[m, 2], metres.
+    """
+    own_mps, own_s = _straight(start, goal, speed_mps)
+    their_mps, their_s = _straight(starts, goals, speed_mps)
+    offsets_m, closing_mps = starts - start, their_mps - own_mps
+    closing2 = np.maximum(1e-9, (closing_mps**2).sum(axis=1))
+    times_s = -(offsets_m * closing_mps).sum(axis=1) / closing2
+    times_s = np.clip(times_s, 0.0, np.minimum(np.minimum(own_s, their_s), _HORIZON_S))
+    nearest_m = np.hypot(*(offsets_m + closing_mps * times_s[:, None]).T)
+    meets = nearest_m < np.minimum(distance_m, np.hypot(*offsets_m.T) - _NEARER_M)
+    places = 0.5 * (start + starts + (own_mps + their_mps) * times_s[:, None])
+    met = np.flatnonzero(meets)
+    met = met[_largest_group(places[met], times_s[met], distance_m)]
+    return met, places[met]
+
+
+def _straight(start: Floats, goal: Floats, speed_mps: float) -> Tuple[Floats, Floats]:
+    """Return velocities of straight ways, float64[..., 2], and how long they take, float64[...]."""
+    way = goal - start
+    length_m = np.maximum(1e-9, np.hypot(way[..., 0], way[..., 1]))
+    return way * (speed_mps / length_m)[..., None], length_m / speed_mps
+
+
+def _largest_group(places: Floats, times_s: Floats, distance_m: float) -> NDArray[np.int64]:
+    """Return the indices of the most places that are near one of them, at about the same time."""
+    if not len(places):
+        return np.zeros(0, np.int64)
+    apart_m = np.hypot(*(places[:, None] - places).T)
+    apart_s = np.abs(times_s[:, None] - times_s)
+    together = (apart_m < distance_m) & (apart_s < _SAME_TIME_S)
+    return np.flatnonzero(together[together.sum(axis=1).argmax()])

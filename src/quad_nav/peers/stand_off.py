@@ -47,13 +47,7 @@ class StandOff:
     """
 
     def __init__(self, tracker: PeerTracker, global_costmap: LayeredCostmap, number: int) -> None:
-        """Begin without moving obstacles.
-
-        Args:
-            tracker: The peers and their distances.
-            global_costmap: Costmap in which holding points are searched.
-            number: Number of the robot, for its random times.
-        """
+        """Begin without moving obstacles; the robot's number is for its random times."""
         self._tracker = tracker
         self._global = global_costmap
         self._number = number
@@ -121,12 +115,9 @@ class StandOff:
     ) -> Optional[YieldDecision]:
         """Decide whether to make room for the obstacle.
 
-        Args:
-            now_s: Time of the decision.
-            pose: Pose of the robot in ``map``.
-            path: Path that the robot follows, float64[n, 2], metres in ``map``.
-            current: The decision in force, None if the robot does not make room for an obstacle.
-            patience_s: Shortest time without progress; the longest is three times that.
+        The robot follows a path, float64[n, 2] in ``map``. The decision in force is None if it does
+        not make room for an obstacle. The shortest time without progress is ``patience_s``, the
+        longest three times that.
 
         Returns:
             The decision from now on, None to go on.
@@ -162,8 +153,7 @@ class StandOff:
         assert self.obstacle is not None
         separation_m = self._tracker.min_separation_m
         point = find_holding_point(
-            self._global.spec,
-            self._global.costs,
+            self._global,
             pose,
             [path],
             self.obstacle.reshape(1, 2),

@@ -19,8 +19,7 @@ for Dynamic Vehicles Using Buffered Voronoi Cells", RA-L 2(2), 2017, section III
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import List, Optional, Sequence, Tuple
+from typing import Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,109 +37,89 @@ Arc = Tuple[NDArray[np.float64], NDArray[np.float64]]
 """Displacements along x and y, float64[_PARTS] each, metres."""
 
 
-@dataclass(frozen=True)
-class LimitedCommand:
-    """A command that keeps the robot inside its cell.
+class Cell:
+    """The Voronoi cell of a robot, which limits its commands."""
 
-    Attributes:
-        command: The command to publish.
-        limited_by: Name of the peer that limited it, "" if none did.
-    """
+    def __init__(
+        self,
+        pose: Pose2D,
+        velocity: Twist2D,
+        peers: Sequence[Peer],
+        safety_radius_m: float,
+        hold_s: float,
+    ) -> None:
+        """Bound the cell of a robot.
 
-    command: Twist2D
-    limited_by: str = ""
+        Args:
+            pose: Robot pose in ``map``.
+            velocity: Current velocity in the robot's frame.
+            peers: Peers whose state is fresh.
+            safety_radius_m: Robot radius plus margin.
+            hold_s: How long a command may stay in force.
+        """
+        self._pose, self._peers = pose, peers
+        self._safety_radius_m, self._hold_s = safety_radius_m, hold_s
+        self._coasting = COASTING_S * np.array(pose.rotate(velocity.vx_mps, velocity.vy_mps))
 
+    def limit(self, command: Twist2D) -> Tuple[Twist2D, str]:
+        """Scale a command down so that the robot stays inside its cell.
 
-def limit_to_cell(
-    pose: Pose2D,
-    velocity: Twist2D,
-    command: Twist2D,
-    peers: Sequence[Peer],
-    safety_radius_m: float,
-    hold_s: float,
-) -> LimitedCommand:
-    """Scale a command down so that the robot stays inside its cell.
+        The path (arc) of the command is kept and flown more slowly, as the local planner has
+        checked it. If too little of it is inside the cell, the robot turns in place, away from the
+        nearest peer; otherwise two robots that graze each other's cells would stand for ever.
 
-    The path (arc) of the command is kept and flown more slowly, as the local planner has
-    checked it. If too little of it is inside the cell, the robot turns in place, away from the
-    nearest peer; otherwise two robots that graze each other's cells would stand for ever.
+        Returns:
+            The limited command, and the name of the peer that limited it, "" if none did.
+        """
+        if command.vx_mps == 0.0 and command.vy_mps == 0.0:
+            return command, ""
+        # No arc is longer than the way that it takes: only peers within it can limit the command.
+        way_m = math.hypot(command.vx_mps, command.vy_mps) * self._hold_s * (1.0 + 1e-9)
+        near = [(peer, *self._offset_and_room(peer)) for peer in self._peers]
+        near = [row for row in near if row[-1] < way_m]
+        if not near:
+            return command, ""
+        arc = self._pose.rotate(*_arc(command, self._hold_s))
+        fraction, nearest = 1.0, None
+        for peer, dx_m, dy_m, room_m in near:
+            allowed = _allowed_fraction(arc, dx_m, dy_m, room_m)
+            if allowed < fraction:
+                fraction, nearest = allowed, peer
+        if nearest is None:
+            return command, ""
+        if fraction < MIN_FRACTION:  # the robot turns in place
+            return _turn_in_place(self._pose, command, nearest), nearest.name
+        vx_mps, vy_mps = fraction * command.vx_mps, fraction * command.vy_mps
+        return Twist2D(vx_mps, vy_mps, fraction * command.vyaw_radps), nearest.name
 
-    Args:
-        pose: Robot pose in ``map``.
-        velocity: Current velocity in the robot's frame.
-        command: Commanded velocity in the robot's frame.
-        peers: Peers whose state is fresh.
-        safety_radius_m: Robot radius plus margin.
-        hold_s: How long the command may stay in force.
+    def limit_velocities(self, velocities: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what the cell leaves of many commands that do not turn, for planning.
 
-    Returns:
-        The limited command, and the peer that limited it, if any.
-    """
-    if not peers or (command.vx_mps == 0.0 and command.vy_mps == 0.0):
-        return LimitedCommand(command)
-    coasting = COASTING_S * np.array(pose.rotate(velocity.vx_mps, velocity.vy_mps))
-    peers = _peers_in_reach(command, coasting, pose, peers, safety_radius_m, hold_s)
-    if not peers:
-        return LimitedCommand(command)
-    arc = pose.rotate(*_arc(command, hold_s))
-    fraction, nearest = _allowed_by_all(arc, coasting, pose, peers, safety_radius_m)
-    if nearest is None:
-        return LimitedCommand(command)
-    if fraction < MIN_FRACTION:  # the robot turns in place
-        return LimitedCommand(_turn_in_place(pose, command, nearest), nearest.name)
-    vx_mps, vy_mps = fraction * command.vx_mps, fraction * command.vy_mps
-    return LimitedCommand(Twist2D(vx_mps, vy_mps, fraction * command.vyaw_radps), nearest.name)
+        Args:
+            velocities: Commands, float64[c, 2], m/s along the axes of ``map``.
 
+        Returns:
+            float64[c, 2], shorter velocities with the same courses, 0 where the robot would turn.
+        """
+        parts = np.ones(len(velocities))
+        for peer in self._peers:
+            dx_m, dy_m, room_m = self._offset_and_room(peer)
+            towards = np.array([dx_m, dy_m]) / max(math.hypot(dx_m, dy_m), 1e-9)
+            carried_m = np.maximum(self._hold_s * (velocities @ towards), 1e-9)
+            parts = np.minimum(parts, room_m / carried_m)
+        parts = np.where(parts < MIN_FRACTION, 0.0, parts)
+        limited: NDArray[np.float64] = velocities * parts[:, None]
+        return limited
 
-def limited_velocities(
-    velocities: NDArray[np.float64],
-    pose: Pose2D,
-    velocity: Twist2D,
-    peers: Sequence[Peer],
-    safety_radius_m: float,
-    hold_s: float,
-) -> NDArray[np.float64]:
-    """Return what the cell leaves of many commands that do not turn, for planning.
-
-    Args:
-        velocities: Commands, float64[c, 2], m/s along the axes of ``map``.
-        pose: Robot pose in ``map``.
-        velocity: Current velocity in the robot's frame.
-        peers: Peers whose state is fresh.
-        safety_radius_m: Robot radius plus margin.
-        hold_s: How long a command may stay in force.
-
-    Returns:
-        float64[c, 2], shorter velocities with the same courses, 0 where the robot would turn.
-    """
-    coasting = COASTING_S * np.array(pose.rotate(velocity.vx_mps, velocity.vy_mps))
-    parts = np.ones(len(velocities))
-    for peer in peers:
-        dx_m, dy_m = peer.x_m - pose.x_m, peer.y_m - pose.y_m
-        room_m = _room_towards(dx_m, dy_m, coasting, safety_radius_m)
-        towards = np.array([dx_m, dy_m]) / max(math.hypot(dx_m, dy_m), 1e-9)
-        carried_m = np.maximum(hold_s * (velocities @ towards), 1e-9)
-        parts = np.minimum(parts, room_m / carried_m)
-    limited: NDArray[np.float64] = velocities * np.where(parts < MIN_FRACTION, 0.0, parts)[:, None]
-    return limited
-
-
-def _peers_in_reach(
-    command: Twist2D,
-    coasting: NDArray[np.float64],
-    pose: Pose2D,
-    peers: Sequence[Peer],
-    safety_radius_m: float,
-    hold_s: float,
-) -> List[Peer]:
-    """Return the peers that can limit a command: no arc is longer than the way that it takes."""
-    way_m = math.hypot(command.vx_mps, command.vy_mps) * hold_s * (1.0 + 1e-9)
-    return [
-        peer
-        for peer in peers
-        if _room_towards(peer.x_m - pose.x_m, peer.y_m - pose.y_m, coasting, safety_radius_m)
-        < way_m
-    ]
+    def _offset_and_room(self, peer: Peer) -> Tuple[float, float, float]:
+        """Return the offset of a peer, and how much nearer a command may bring the robot to it."""
+        dx_m, dy_m = peer.x_m - self._pose.x_m, peer.y_m - self._pose.y_m
+        distance_m = math.hypot(dx_m, dy_m)
+        if distance_m == 0.0:
+            return dx_m, dy_m, 0.0
+        approach_m = (self._coasting[0] * dx_m + self._coasting[1] * dy_m) / distance_m
+        room_m = 0.5 * distance_m - self._safety_radius_m - max(approach_m, 0.0)
+        return dx_m, dy_m, float(max(room_m, 0.0))
 
 
 def _turn_in_place(pose: Pose2D, command: Twist2D, peer: Peer) -> Twist2D:
@@ -155,47 +134,11 @@ def _turn_in_place(pose: Pose2D, command: Twist2D, peer: Peer) -> Twist2D:
     return Twist2D(0.0, 0.0, _TURN_RADPS if bearing_rad < -1e-6 else -_TURN_RADPS)
 
 
-def _room_towards(
-    dx_m: float, dy_m: float, coasting: NDArray[np.float64], safety_radius_m: float
-) -> float:
-    """Return how much nearer a command may bring the robot to a peer at offset (dx, dy)."""
+def _allowed_fraction(arc: Arc, dx_m: float, dy_m: float, room_m: float) -> float:
+    """Return the part of the arc, 0 to 1, that is inside the half-plane of a peer."""
     distance_m = math.hypot(dx_m, dy_m)
     if distance_m == 0.0:
         return 0.0
-    approach_m = (coasting[0] * dx_m + coasting[1] * dy_m) / distance_m
-    return float(max(0.5 * distance_m - safety_radius_m - max(approach_m, 0.0), 0.0))
-
-
-def _allowed_by_all(
-    arc: Arc,
-    coasting: NDArray[np.float64],
-    pose: Pose2D,
-    peers: Sequence[Peer],
-    safety_radius_m: float,
-) -> Tuple[float, Optional[Peer]]:
-    """Return the part of the arc inside the cell, and the peer that limits it, if any."""
-    fraction = 1.0
-    nearest: Optional[Peer] = None
-    for peer in peers:
-        dx_m, dy_m = peer.x_m - pose.x_m, peer.y_m - pose.y_m
-        allowed = _allowed_fraction(arc, coasting, dx_m, dy_m, safety_radius_m)
-        if allowed < fraction:
-            fraction, nearest = allowed, peer
-    return fraction, nearest
-
-
-def _allowed_fraction(
-    arc: Arc,
-    coasting: NDArray[np.float64],
-    dx_m: float,
-    dy_m: float,
-    safety_radius_m: float,
-) -> float:
-    """Return the part of the arc, 0 to 1, that is inside the half-plane of one peer."""
-    distance_m = math.hypot(dx_m, dy_m)
-    if distance_m == 0.0:
-        return 0.0
-    room_m = _room_towards(dx_m, dy_m, coasting, safety_radius_m)
     towards_m = (arc[0] * dx_m + arc[1] * dy_m) / distance_m
     outside = towards_m > room_m + 1e-9
     first = int(outside.argmax())

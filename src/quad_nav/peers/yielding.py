@@ -162,8 +162,7 @@ class YieldRules:
             return False
         self._next_check_s = now_s + _CHECK_PERIOD_S
         return not is_reachable(
-            self._global.spec,
-            self._global.costs,
+            self._global,
             pose,
             current.holding_point,
             np.array([peer.position for peer in tracker.peers]),
@@ -182,8 +181,7 @@ class YieldRules:
         ]
         for path in (_path_ahead(peer), predict_peer(peer, tracker.cruise_mps)):
             holding_point = find_holding_point(
-                self._global.spec,
-                self._global.costs,
+                self._global,
                 pose,
                 [path, *others],
                 positions,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.costmap import collision
-from quad_nav.costmap.cost_grid_kernel import CostmapView
+from quad_nav.costmap.cost_grid import costmap_view
 from quad_nav.errors import NoPath
 from quad_nav.geometry import Pose2D, angle_difference, normalize_angle
 from quad_nav.grid import GridSpec
@@ -42,27 +42,13 @@ class Carrot:
     def make_plan(
         self, spec: GridSpec, costs: NDArray[np.uint8], start: Pose2D, goal: Pose2D
     ) -> NDArray[np.float64]:
-        """Return the start and the nearest pose to the goal where the robot fits.
-
-        Args:
-            spec: Grid of the global costmap.
-            costs: uint8[H, W].
-            start: Pose of the robot.
-            goal: Pose of the goal.
-
-        Returns:
-            float64[2, 3], rows x, y, yaw.
+        """Return the start and the nearest pose to the goal where the robot fits, float64[2, 3].
 
         Raises:
             NoPath: The robot fits nowhere on the line, not even where it is.
         """
         if len(self.footprint) >= _CORNERS_NEEDED:
-            costmap = CostmapView(
-                np.ascontiguousarray(costs),
-                float(spec.origin_x_m),
-                float(spec.origin_y_m),
-                float(spec.resolution_m),
-            )
+            costmap = costmap_view(spec, costs)
             turn_rad = angle_difference(goal.yaw_rad, start.yaw_rad)
             share = 1.0
             while share >= 0.0:
@@ -71,7 +57,7 @@ class Carrot:
                     start.y_m + share * (goal.y_m - start.y_m),
                     normalize_angle(start.yaw_rad + share * turn_rad),
                 )
-                if collision.footprint_cost(costmap, self.footprint, *pose) >= 0.0:
+                if collision.footprint_cost(costmap, self.footprint, pose) >= 0.0:
                     return np.array([(start.x_m, start.y_m, start.yaw_rad), pose])
                 share -= _SHARE_STEP
         raise NoPath(

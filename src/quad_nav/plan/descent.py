@@ -131,23 +131,11 @@ def step_down(
     path: NDArray[np.float32],
     last: int,
 ) -> Tuple[bool, int, np.float32, np.float32]:
-    """Return the next position of a descent.
+    """Return the next position of a descent of float32[n]: whether there is one, cell, dx and dy.
 
-    The step is half a cell along the gradient where all cells around are reached, otherwise
-    to the centre of the lowest of them; so too when the path is where it was two points ago.
-
-    Args:
-        potential: float32[n].
-        size_x: Cells in a row.
-        around: ``surroundings`` of the cell.
-        cell: Flat cell of the position.
-        dx: Offset from the cell's centre to the right, float32, in cells.
-        dy: Offset upwards.
-        path: float32[k, 2], the path so far, cells (x, y).
-        last: Row of the path's last point.
-
-    Returns:
-        False if there is no next position, the flat cell and its offset dx, dy.
+    The step is half a cell along the gradient where all cells around are reached, otherwise to the
+    centre of the lowest of them; so too when the path, float32[k, 2], is where it was two points
+    before its last row.
     """
     lowest, all_reached, x00, y00, x10, y10, x01, y01, x11, y11 = around
     oscillates = (
@@ -177,14 +165,9 @@ def _nearest(cell: int, dx: np.float32, dy: np.float32, size_x: int, size: int) 
 def descend(
     potential: NDArray[np.float32], size_x: int, start: int, source: int, path: NDArray[np.float32]
 ) -> Tuple[int, bool]:
-    """Follow NavFn's potential down in half-cell steps.
+    """Follow NavFn's potential, float32[n], down in half-cell steps to the wave's source.
 
-    Args:
-        potential: float32[n].
-        size_x: Cells in a row.
-        start: Flat cell where the descent begins.
-        source: Flat cell where the wave began.
-        path: float32[k, 2], filled with cells (x, y).
+    The path, float32[k, 2], is filled with cells (x, y).
 
     Returns:
         The number of points written, and True if the source was reached.

@@ -28,13 +28,13 @@ from typing import Any, Optional, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.errors import NoPath
+from quad_nav.errors import GoalOutsideMap, StartOutsideMap
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
 from quad_nav.parameter import POSITIVE, choice, fixed_flag, fixed_whole, flag, signed, whole
 from quad_nav.plan import global_planner_kernel as kernel
 from quad_nav.plan import wavefront_kernel as wavefront
-from quad_nav.plan.navfn import goal_cell_of, start_cell_of
+from quad_nav.plan.navfn import cell_on_map, no_path
 from quad_nav.plan.orientations import ORIENTATIONS, with_headings
 from quad_nav.plan.wavefront import Wavefront
 
@@ -101,16 +101,11 @@ class SearchPlanner:
     ) -> NDArray[np.float64]:
         """Plan a path; see ``GlobalPlanner.make_plan``.
 
-        The start's cell of ``costs`` is set to FREE and, with ``outline_map``, the outermost
-        cells to LETHAL. The last row of the plan is the goal.
-
-        Raises:
-            StartOutsideMap: The robot is off the costmap.
-            GoalOutsideMap: The goal is off the costmap.
-            NoPath: The search does not reach the goal.
+        The start's cell of ``costs`` is set to FREE and, with ``outline_map``, the outermost cells
+        to LETHAL. The last row of the plan is the goal.
         """
-        start_cell = start_cell_of(spec, start)
-        goal_cell = goal_cell_of(spec, goal)
+        start_cell = cell_on_map(spec, start, "robot", StartOutsideMap)
+        goal_cell = cell_on_map(spec, goal, "goal", GoalOutsideMap)
         costs[start_cell[1], start_cell[0]] = FREE
         if self.params.outline_map:
             _outline(costs)
@@ -118,10 +113,7 @@ class SearchPlanner:
         else:
             path = self._path_to_the_border(spec, costs, start, goal, goal_cell)
         if not len(path):
-            raise NoPath(
-                f"no path from ({start.x_m:.2f}, {start.y_m:.2f}) to "
-                f"({goal.x_m:.2f}, {goal.y_m:.2f}) m on the global costmap"
-            )
+            raise no_path(start, goal)
         plan = np.zeros((len(path) + self._goals_appended, 3))
         plan[: len(path), :2] = (
             path[::-1].astype(np.float64) + self._offset

@@ -65,7 +65,7 @@ def a_star(
     planar: bool,
     max_visits: int,
 ) -> bool:
-    """Spread a potential from the start until the goal is visited.
+    """Spread a potential from a start until the goal is visited; return whether it was.
 
     A cell's potential is final when it is first touched.
 
@@ -79,9 +79,6 @@ def a_star(
         neutral: Cost of a free cell, weight of the heuristic.
         planar: True for potentials of a planar wave.
         max_visits: Most cells to visit.
-
-    Returns:
-        True if the goal was visited.
     """
     size = potential.size
     queue = Queue(np.empty(size, dtype=np.float32), np.empty(size, dtype=np.int64))
@@ -146,16 +143,9 @@ def gradient_path(
     goal_y: float,
     path: NDArray[np.float32],
 ) -> int:
-    """Follow the gradient down from the goal to the start.
+    """Follow the gradient of float32[n] down from the goal to the start, both in cells.
 
-    Args:
-        potential: float32[n].
-        size_x: Cells in a row.
-        start_x: Start, in cells.
-        start_y: Start, in cells.
-        goal_x: Goal, in cells.
-        goal_y: Goal, in cells.
-        path: float32[k, 2], filled with cells (x, y).
+    The path, float32[k, 2], is filled with cells (x, y).
 
     Returns:
         The number of points, 0 if the descent ends elsewhere.

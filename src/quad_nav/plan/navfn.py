@@ -20,12 +20,12 @@ real-time robot navigation", IROS 2000, as ROS navigation implements it, limits 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Optional, Tuple
+from typing import Optional, Tuple, Type
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.errors import GoalOutsideMap, NoPath, StartOutsideMap
+from quad_nav.errors import GoalOutsideMap, NoPath, PlanningError, StartOutsideMap
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, INSCRIBED, UNKNOWN, GridSpec
 from quad_nav.parameter import fixed_flag, fixed_number
@@ -93,10 +93,10 @@ class Navfn:
             GoalOutsideMap: The goal is off the costmap and there is no tolerance.
             NoPath: The wave does not reach the goal.
         """
-        start_cell = start_cell_of(spec, start)
+        start_cell = cell_on_map(spec, start, "robot", StartOutsideMap)
         costs[start_cell[1], start_cell[0]] = FREE
         if self.params.default_tolerance_m <= 0.0:
-            goal_cell = goal_cell_of(spec, goal)
+            goal_cell = cell_on_map(spec, goal, "goal", GoalOutsideMap)
         else:  # a border cell is never reached, so the wave covers the map
             goal_cell = spec.cell_of(goal.x_m, goal.y_m) or (0, 0)
         end = None
@@ -110,10 +110,7 @@ class Navfn:
             self._potential = self._spread(costs, start_cell, goal_cell)
             end = self._reached_pose_near(spec, goal)
         if end is None:
-            raise NoPath(
-                f"no path from ({start.x_m:.2f}, {start.y_m:.2f}) to "
-                f"({goal.x_m:.2f}, {goal.y_m:.2f}) m on the global costmap"
-            )
+            raise no_path(start, goal)
         return self._plan_to(spec, start_cell, end)
 
     def _never_arrives(self, costs: NDArray[np.uint8], start: Cell, goal: Cell) -> bool:
@@ -215,17 +212,14 @@ def potential_from(
     stop_at_target: bool,
     heuristic: bool = False,
 ) -> NDArray[np.float32]:
-    """Spread a wave from a cell.
+    """Return the potential, float32[H, W], of a wave from one cell (x, y) to another.
 
     Args:
         nav_costs: uint8[H, W], see ``navigation_costs``.
-        source: Cell (x, y) where the wave begins.
-        target: Cell (x, y) to reach.
+        source: Where the wave begins.
+        target: Cell to reach.
         stop_at_target: Stop at the front that reaches the target.
         heuristic: Take cells in A*'s order.
-
-    Returns:
-        The potential, float32[H, W].
     """
     own = np.arange(256, dtype=np.uint8)
     params = _wave_params(own, bool(stop_at_target), bool(heuristic))
@@ -252,12 +246,7 @@ def _spread(
 def path_from(
     potential: NDArray[np.float32], start: Cell, source: Cell
 ) -> Tuple[NDArray[np.float32], bool]:
-    """Descend from a cell to the wave's source.
-
-    Args:
-        potential: float32[H, W].
-        start: Cell (x, y) where the descent begins.
-        source: Cell (x, y) where the wave began.
+    """Descend a potential, float32[H, W], from a cell (x, y) to the wave's source.
 
     Returns:
         The path, float32[n, 2] cells (x, y), and True if it reached the source. It ends
@@ -276,31 +265,16 @@ def _flat(cell: Cell, size_x: int) -> int:
     return cell[1] * size_x + cell[0]
 
 
-def start_cell_of(spec: GridSpec, start: Pose2D) -> Cell:
-    """Return the robot's cell (x, y).
-
-    Raises:
-        StartOutsideMap: The robot is off the costmap.
-    """
-    cell = spec.cell_of(start.x_m, start.y_m)
+def cell_on_map(spec: GridSpec, pose: Pose2D, who: str, error: Type[PlanningError]) -> Cell:
+    """Return the cell (x, y) of the robot or the goal; raise an error if it is off the costmap."""
+    cell = spec.cell_of(pose.x_m, pose.y_m)
     if cell is None:
-        raise StartOutsideMap(
-            f"the robot at ({start.x_m:.2f}, {start.y_m:.2f}) m is not on "
-            f"the global costmap, {spec.extent}"
-        )
+        place = f"({pose.x_m:.2f}, {pose.y_m:.2f}) m"
+        raise error(f"the {who} at {place} is not on the global costmap, {spec.extent}")
     return cell
 
 
-def goal_cell_of(spec: GridSpec, goal: Pose2D) -> Cell:
-    """Return the goal's cell (x, y).
-
-    Raises:
-        GoalOutsideMap: The goal is off the costmap.
-    """
-    cell = spec.cell_of(goal.x_m, goal.y_m)
-    if cell is None:
-        raise GoalOutsideMap(
-            f"the goal at ({goal.x_m:.2f}, {goal.y_m:.2f}) m is not on "
-            f"the global costmap, {spec.extent}"
-        )
-    return cell
+def no_path(start: Pose2D, goal: Pose2D) -> NoPath:
+    """Return the error of a search that does not reach the goal."""
+    ways = f"({start.x_m:.2f}, {start.y_m:.2f}) to ({goal.x_m:.2f}, {goal.y_m:.2f}) m"
+    return NoPath(f"no path from {ways} on the global costmap")

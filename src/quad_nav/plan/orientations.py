@@ -52,17 +52,10 @@ _TURNED_RAD = {
 def with_headings(
     plan: NDArray[np.float64], start_yaw_rad: float, mode: int, window: int
 ) -> NDArray[np.float64]:
-    """Return a plan with new yaws in all rows but the last.
+    """Return a plan, float64[n, 3], with new yaws in all rows but the last.
 
-    Args:
-        plan: float64[n, 3], rows x, y, yaw.
-        start_yaw_rad: Heading of the robot, with which modes that interpolate begin.
-        mode: One of ``OrientationMode``.
-        window: The direction at a point is that from the point so many before to the point so
-            many after it.
-
-    Returns:
-        float64[n, 3].
+    Modes that interpolate begin with the robot's heading. The direction at a point is that from the
+    point ``window`` points before to the one so many after it.
     """
     plan = plan.copy()
     mode = OrientationMode(mode)

@@ -49,17 +49,8 @@ def plan_near(
 ) -> NDArray[np.float64]:
     """Plan to the goal, or to the first point on square rings around it that has a plan.
 
-    Args:
-        planner: The planner, called with the next four arguments.
-        spec: Grid of the global costmap.
-        costs: uint8[H, W] on it.
-        start: Pose of the robot.
-        goal: Pose of its goal.
-        tolerance_m: How far from the goal along x or y a point may be.
-        append_goal: End a plan to another point at the goal all the same.
-
-    Returns:
-        The plan, as ``GlobalPlanner.make_plan``.
+    A point may be ``tolerance_m`` away along x or y; with ``append_goal`` its plan ends at the goal
+    all the same. Other arguments are those of ``GlobalPlanner.make_plan``.
 
     Raises:
         PlanningError: No point has a plan; the error is the goal's own.

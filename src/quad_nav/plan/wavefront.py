@@ -26,11 +26,7 @@ class Wavefront:
         self._changed: List[Tuple[slice, slice]] = []
 
     def begin(self, shape: Tuple[int, int]) -> NDArray[np.float32]:
-        """Return the potential, float32[H, W], all NOT_REACHED. It ends the wave before.
-
-        Args:
-            shape: Rows and columns of the costmap.
-        """
+        """Return the potential, float32[H, W], all NOT_REACHED. It ends the wave before."""
         if self._potential.shape == shape:
             for square in self._changed:
                 self._potential[square] = NOT_REACHED
@@ -57,20 +53,11 @@ class Wavefront:
         target: int,
         max_fronts: int,
     ) -> bool:
-        """Spread the potential that has begun at a source; see ``plan.wavefront_kernel.propagate``.
+        """Spread the potential that has begun at a source; return whether it stopped at the target.
 
-        The wave never enters the outermost ring of cells.
-
-        Args:
-            costs: uint8[H, W], costs of the costmap.
-            first_front: int64[k], flat cells at most two columns and rows from the source.
-            params: Parameters of the wave.
-            source: Flat cell where the wave has begun.
-            target: Flat cell that the wave is to reach.
-            max_fronts: Most fronts to spread.
-
-        Returns:
-            True if the wave stopped at the target.
+        The wave never enters the outermost ring of cells. The first front is of flat cells,
+        int64[k], at most two columns and rows from the source; see
+        ``plan.wavefront_kernel.propagate``.
         """
         arrived, fronts = kernel.propagate(
             np.ascontiguousarray(costs).ravel(),

@@ -37,16 +37,9 @@ class WaveParams(NamedTuple):
 
 
 def crossings(costs: NDArray[Any], obstacle: int) -> NDArray[np.float32]:
-    """Return what the shortest way over a cell costs.
+    """Return what the shortest way over cells of these costs is worth, float32, +inf for obstacles.
 
     A wave comes to a neighbour whose potential is higher than its own by more than that.
-
-    Args:
-        costs: Costs of cells, any shape.
-        obstacle: Cost from which on cells are never entered.
-
-    Returns:
-        float32 of the same shape, +inf for cells that are never entered.
     """
     exact = np.asarray(costs, dtype=np.float32).astype(np.float64)
     crossing: NDArray[np.float32] = (_INVERSE_SQRT2 * exact).astype(np.float32)
@@ -63,18 +56,10 @@ def arrival(
     above: np.float32,
     planar: bool,
 ) -> np.float32:
-    """Return the potential, float32, of a cell from those of its neighbours.
+    """Return the potential, float32, of a cell with a cost from those of its four neighbours.
 
-    It is that of a planar wave that arrives over the two lower neighbours, or else of a step
-    from the lowest one.
-
-    Args:
-        cost: float32, cost of the cell.
-        left: float32, potential of the left neighbour.
-        right: float32, potential of the right neighbour.
-        below: float32, potential of the lower neighbour.
-        above: float32, potential of the upper neighbour.
-        planar: True for a planar wave.
+    It is that of a planar wave that arrives over the two lower neighbours, or else of a step from
+    the lowest one.
     """
     horizontal, vertical = min(left, right), min(below, above)
     lower = min(horizontal, vertical)
@@ -117,17 +102,10 @@ def start_between_cells(
     dy: np.float32,
     neutral: int,
 ) -> NDArray[np.int64]:
-    """Begin at a point between the centres of four cells.
+    """Begin at a point between the centres of four cells of float32[n].
 
-    The four cells share the cost of two free cells by the areas opposite to them.
-
-    Args:
-        potential: float32[n], changed in place.
-        source: Flat cell left of and below the point.
-        size_x: Cells in a row.
-        dx: float32, cells by which the point is right of the source's centre.
-        dy: float32, cells by which the point is above the source's centre.
-        neutral: Cost of a free cell.
+    The point is (dx, dy) cells right of and above the source's centre. The four cells share the
+    cost of two free cells by the areas opposite to them.
 
     Returns:
         The first front, int64[8] flat cells.
@@ -185,16 +163,13 @@ def push(
 
     Args:
         buckets: uint32[k], changed in place; the place behind a full bucket is overwritten, too.
-        end: Index after the bucket's last cell.
+        end: Index after the bucket's last cell; the result is that index now.
         last_roomy: Last index from which on the bucket has places for four cells.
         states: uint8[n], LETHAL for cells that are in a bucket; changed in place.
         cells: Flat cells, all different.
         before: The states of the four cells.
         wanted: Four bools, True for the cells that the wave comes to.
         may_fill: False if the bucket is known to have places for all.
-
-    Returns:
-        Index after the bucket's last cell now.
     """
     # Not one branch for each cell: a processor cannot foresee which cells a wave comes to.
     new_0, new_1, new_2, new_3 = wanted

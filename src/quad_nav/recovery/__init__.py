@@ -11,12 +11,11 @@ from __future__ import annotations
 from quad_nav.recovery.clear_costmap import ClearCostmap, ClearCostmapParams
 from quad_nav.recovery.move_slow import MoveSlowAndClear, MoveSlowAndClearParams
 from quad_nav.recovery.recovery import ParameterLimit, Recovery, RecoveryContext, Step
-from quad_nav.recovery.rotate import FootprintCost, Rotate, RotateParams, TurnLimits
+from quad_nav.recovery.rotate import Rotate, RotateParams, TurnLimits
 
 __all__ = [
     "ClearCostmap",
     "ClearCostmapParams",
-    "FootprintCost",
     "MoveSlowAndClear",
     "MoveSlowAndClearParams",
     "ParameterLimit",

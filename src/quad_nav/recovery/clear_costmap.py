@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Iterable, Optional, Tuple
 
+from quad_nav.costmap.cost_grid import Square
 from quad_nav.costmap.layer import Redraw
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.parameter import deviation, fixed_flag, fixed_number, fixed_text
-from quad_nav.recovery.recovery import RecoveryContext, Step
+from quad_nav.recovery.recovery import OneStepRecovery, RecoveryContext, Step
 
 # The layers that upstream clears by default. No layer has this name there either: the
 # default obstacle layer is called "obstacle_layer".
@@ -44,20 +45,13 @@ class ClearCostmapParams:
     redraw_cleared_costmaps: bool = deviation()
 
 
-class ClearCostmap:
+class ClearCostmap(OneStepRecovery):
     """Clears obstacles outside of a square around the robot.
 
     The square has sides of ``reset_distance_m``; ``invert_area_to_clear`` clears its inside.
     """
 
-    period_s = 0.0
-
-    def __init__(self, params: ClearCostmapParams) -> None:
-        """Create the behaviour."""
-        self.params = params
-
-    def start(self, context: RecoveryContext) -> None:
-        """Start the behaviour; it has no state."""
+    params: ClearCostmapParams
 
     def step(self, context: RecoveryContext) -> Step:
         """Clear the costmaps in one step, and update them if ``force_updating`` is set."""
@@ -70,13 +64,9 @@ class ClearCostmap:
             if pose is None:
                 skipped.append(name)
                 continue
+            square = Square(pose.x_m, pose.y_m, params.reset_distance_m)
             costmap.clear_area(
-                self._names(costmap),
-                pose.x_m,
-                pose.y_m,
-                params.reset_distance_m,
-                keep_inside=not params.invert_area_to_clear,
-                redraw=redraw,
+                self._names(costmap), square, not params.invert_area_to_clear, redraw
             )
             if params.force_updating:
                 costmap.update(context.now_s, pose)

@@ -9,10 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import List, Tuple
 
+from quad_nav.costmap.cost_grid import Square
 from quad_nav.costmap.layer import Redraw
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.parameter import POSITIVE, deviation, fixed_number, fixed_text
-from quad_nav.recovery.recovery import ParameterLimit, RecoveryContext, Step
+from quad_nav.recovery.recovery import OneStepRecovery, ParameterLimit, RecoveryContext, Step
 
 # Upstream clears the layers whose names have this word in them.
 UPSTREAM_LAYER_WORD = "obstacles"
@@ -85,21 +86,14 @@ class MoveSlowAndClearParams:
         return ParameterLimit(tuple(greatest), self.limited_distance_m)
 
 
-class MoveSlowAndClear:
+class MoveSlowAndClear(OneStepRecovery):
     """Clears obstacles around the robot and limits its speed.
 
     The cleared square reaches ``clearing_distance_m`` to each side of the robot. The limit ends
     when the robot has moved ``limited_distance_m``.
     """
 
-    period_s = 0.0
-
-    def __init__(self, params: MoveSlowAndClearParams) -> None:
-        """Create the behaviour."""
-        self.params = params
-
-    def start(self, context: RecoveryContext) -> None:
-        """Start the behaviour; it has no state."""
+    params: MoveSlowAndClearParams
 
     def step(self, context: RecoveryContext) -> Step:
         """Clear the costmaps and limit the speed in one step."""
@@ -110,7 +104,9 @@ class MoveSlowAndClear:
             if pose is None:
                 messages.append(f"{name} costmap not cleared: robot pose unknown")
             elif not costmap.free_layers(
-                self._names(costmap), pose.x_m, pose.y_m, 2.0 * params.clearing_distance_m, redraw
+                self._names(costmap),
+                Square(pose.x_m, pose.y_m, 2.0 * params.clearing_distance_m),
+                redraw,
             ):
                 messages.append(
                     f"{name} costmap not cleared: it has no obstacle layer or"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Optional, Protocol, Tuple
+from typing import Any, Optional, Protocol, Tuple
 
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.geometry import Pose2D, Twist2D
@@ -78,3 +78,15 @@ class Recovery(Protocol):
     def step(self, context: RecoveryContext) -> Step:
         """Do the next step."""
         ...
+
+
+class OneStepRecovery:
+    """Base of the behaviours that do all in one step and have no state."""
+
+    period_s = 0.0
+
+    def __init__(self, params: Any) -> None:
+        self.params = params
+
+    def start(self, context: RecoveryContext) -> None:
+        """Start the behaviour; it has no state."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Callable, Optional
+from typing import Optional
 
 import numpy as np
 
@@ -48,9 +48,6 @@ class RotateParams:
     stop_after_rotation: bool = deviation()
 
 
-FootprintCost = Callable[[LayeredCostmap, Pose2D], float]
-
-
 class Rotate:
     """Turns the robot once in place, as long as its footprint stays free.
 
@@ -58,16 +55,10 @@ class Rotate:
     in-place minimum and the maximum; the maximum takes precedence.
     """
 
-    def __init__(self, params: RotateParams, footprint_cost: FootprintCost) -> None:
-        """Create the behaviour.
-
-        Args:
-            params: The parameters.
-            footprint_cost: Cost of the footprint at a pose in a costmap, negative in collision.
-        """
+    def __init__(self, params: RotateParams) -> None:
+        """Create the behaviour."""
         self.params = params
         self.period_s = 1.0 / params.frequency_hz
-        self._footprint_cost = footprint_cost
         self._start_yaw_rad: Optional[float] = None
         self._past_half_turn = False
 
@@ -106,7 +97,7 @@ class Rotate:
 
     def _is_free(self, costmap: LayeredCostmap, pose: Pose2D, remaining_rad: float) -> bool:
         return all(
-            self._footprint_cost(costmap, Pose2D(pose.x_m, pose.y_m, pose.yaw_rad + turn)) >= 0.0
+            costmap.footprint_cost(Pose2D(pose.x_m, pose.y_m, pose.yaw_rad + turn)) >= 0.0
             for turn in np.arange(0.0, remaining_rad, self.params.sim_granularity_rad)
         )
 

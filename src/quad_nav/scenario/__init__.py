@@ -6,3 +6,8 @@
 of the ROS nodes). ``random_mission`` makes scenes and goals, ``scene_map`` the map of a scene,
 ``assembly`` a navigator, and ``warm_up`` compiles the kernels.
 """
+
+from __future__ import annotations
+
+RANDOM = "random"
+"""Value of ``scene`` and ``goals`` that asks for a random mission."""

@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Callable, Dict, Optional
+from typing import Any, Callable, Dict, Mapping, Optional
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.config import Configuration
-from quad_nav.config.filters import FilterType
 from quad_nav.config.plugins import Plugin
 from quad_nav.config.recoveries import RecoveryParams
 from quad_nav.control.controller import LocalPlanner
 from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
-from quad_nav.control.rollout import footprint_cost
 from quad_nav.control.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layer import LayerParams
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.peer_layer import PeerLayerParams
-from quad_nav.costmap.scan_filter import ScanFilter, ScanFilters
+from quad_nav.costmap.scan_filter import ScanFilters
 from quad_nav.costmap.scan_validator import ScanValidator
-from quad_nav.geometry import Pose2D
-from quad_nav.navigator.command_filter import CommandFilter, VoronoiCell
+from quad_nav.navigator.command_filter import VoronoiCell
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
 from quad_nav.peers.coordinator import PeerCoordinator
@@ -39,6 +36,7 @@ from quad_nav.recovery import (
     MoveSlowAndClearParams,
     Recovery,
     Rotate,
+    RotateParams,
 )
 
 # The planner that each dataclass of parameters is for; both take the footprint, float64[n, 2].
@@ -52,15 +50,18 @@ LOCAL_PLANNERS: Dict[type, Callable[[Any, NDArray[np.float64], float], LocalPlan
     DwaParams: DwaPlanner,
 }
 
+_RECOVERIES: Dict[type, Callable[[Any], Recovery]] = {
+    ClearCostmapParams: ClearCostmap,
+    MoveSlowAndClearParams: MoveSlowAndClear,
+    RotateParams: Rotate,
+}
 _PEER_LAYER = ("peer_layer", PeerLayerParams())
 
 
 def build_navigator(configuration: Configuration, number: Optional[int] = None) -> Navigator:
     """Build the idle navigator that a configuration describes.
 
-    Args:
-        configuration: The configuration.
-        number: Number of the robot among its peers, by default the configuration's ``robot``.
+    ``number`` is that of the robot among its peers, by default the configuration's ``robot``.
     """
     global_costmap = LayeredCostmap(_global_costmap(configuration))
     local_costmap = LayeredCostmap(_local_costmap(configuration))
@@ -69,7 +70,8 @@ def build_navigator(configuration: Configuration, number: Optional[int] = None) 
         global_costmap,
         local_costmap,
         build_global_planner(configuration.global_planner, global_costmap.footprint),
-        _local_planner(
+        _made(
+            LOCAL_PLANNERS,
             configuration.local_planner,
             local_costmap.footprint,
             configuration.local_planner_period_s,
@@ -81,29 +83,18 @@ def build_navigator(configuration: Configuration, number: Optional[int] = None) 
             local_costmap,
             configuration.robot if number is None else number,
         ),
-        [_command_filter(kind) for _, kind in configuration.command_filters],
+        [
+            kind.make() if isinstance(kind, Plugin) else VoronoiCell()
+            for _, kind in configuration.command_filters
+        ],
     )
 
 
 def build_scan_filters(configuration: Configuration) -> ScanFilters:
     """Build the scan filters of one robot, for all of its sensors."""
-    return ScanFilters(
-        [_scan_filter(kind, configuration) for _, kind in configuration.scan_filters]
-    )
-
-
-def _scan_filter(kind: FilterType, configuration: Configuration) -> ScanFilter:
-    if isinstance(kind, Plugin):
-        made: ScanFilter = kind.make()
-        return made
-    return ScanValidator(configuration.scan_validator)
-
-
-def _command_filter(kind: FilterType) -> CommandFilter:
-    if isinstance(kind, Plugin):
-        made: CommandFilter = kind.make()
-        return made
-    return VoronoiCell()
+    validator = ScanValidator(configuration.scan_validator)
+    kinds = (kind for _, kind in configuration.scan_filters)
+    return ScanFilters([kind.make() if isinstance(kind, Plugin) else validator for kind in kinds])
 
 
 def apply_configuration(navigator: Navigator, configuration: Configuration) -> None:
@@ -124,21 +115,17 @@ def apply_configuration(navigator: Navigator, configuration: Configuration) -> N
     navigator.controller.set_footprint(navigator.local_costmap.footprint)
 
 
+def _made(makers: Mapping[type, Callable[..., Any]], params: Any, *arguments: Any) -> Any:
+    """Make a plugin, or the part of the core that a dataclass of parameters is for."""
+    if isinstance(params, Plugin):
+        return params.make(*arguments)
+    return makers[type(params)](params, *arguments)
+
+
 def build_global_planner(params: Any, footprint: NDArray[np.float64]) -> GlobalPlanner:
     """Build a global planner from its parameters and the footprint, float64[n, 2]."""
-    if isinstance(params, Plugin):
-        planner: GlobalPlanner = params.make(footprint)
-        return planner
-    return GLOBAL_PLANNERS[type(params)](params, footprint)
-
-
-def _local_planner(
-    params: Any, footprint: NDArray[np.float64], control_period_s: float
-) -> LocalPlanner:
-    if isinstance(params, Plugin):
-        planner: LocalPlanner = params.make(footprint, control_period_s)
-        return planner
-    return LOCAL_PLANNERS[type(params)](params, footprint, control_period_s)
+    planner: GlobalPlanner = _made(GLOBAL_PLANNERS, params, footprint)
+    return planner
 
 
 def _global_costmap(configuration: Configuration) -> CostmapParams:
@@ -183,15 +170,5 @@ def _layer_with_timeout(layer: LayerParams, limit_s: float) -> LayerParams:
 
 def build_recovery(params: RecoveryParams) -> Recovery:
     """Build a recovery behaviour."""
-    if isinstance(params, Plugin):
-        recovery: Recovery = params.make()
-        return recovery
-    if isinstance(params, ClearCostmapParams):
-        return ClearCostmap(params)
-    if isinstance(params, MoveSlowAndClearParams):
-        return MoveSlowAndClear(params)
-    return Rotate(params, _footprint_cost)
-
-
-def _footprint_cost(costmap: LayeredCostmap, pose: Pose2D) -> float:
-    return footprint_cost(costmap.spec, costmap.costs, costmap.footprint, pose)
+    recovery: Recovery = _made(_RECOVERIES, params)
+    return recovery

@@ -28,6 +28,7 @@ BYTES_PER_CELL = 64
 """At least the memory that a cell of any costmap takes; ``config.workload`` computes it exactly."""
 _DEFAULTS = {parameter.name: parameter.default for parameter in parameters_of(MapParams)}
 _AXES = (("width", "origin_x"), ("height", "origin_y"))
+_KEYS = ("resolution", *_AXES[0], *_AXES[1])
 
 
 def scene_bounds(scene: Scene) -> Bounds:
@@ -65,7 +66,7 @@ def cover_area(
     """
     given = tree.get(COSTMAP)
     costmap: Mapping[str, Any] = given if isinstance(given, dict) else {}
-    values = {key: costmap.get(key, _DEFAULTS[key]) for key in _keys()}
+    values = {key: costmap.get(key, _DEFAULTS[key]) for key in _KEYS}
     if _has_no_fixed_size(costmap) or not all(map(is_number, values.values())):
         return  # faulty values are reported when the tree is loaded
     if not is_feasible(area[2] - area[0], area[3] - area[1], values["resolution"]):
@@ -96,11 +97,7 @@ def size_line(
 ) -> str:
     """Return the parameters that make a global costmap cover an area, to be copied.
 
-    Args:
-        area: The area.
-        resolution_m: Size of a cell.
-        in_a_file: Return a line of YAML instead of options of ``quad fly``.
-        with_resolution: Set the size of a cell, too.
+    They are a line of YAML for a file, or else options of ``quad fly``.
     """
     low_x, low_y, high_x, high_y = area
     values = {
@@ -138,10 +135,6 @@ def grouped(bounds: Sequence[Optional[Bounds]]) -> Dict[Bounds, List[int]]:
         if own is not None:
             robots.setdefault(own, []).append(number)
     return robots
-
-
-def _keys() -> Tuple[str, ...]:
-    return ("resolution", *(key for axis in _AXES for key in axis))
 
 
 def _has_no_fixed_size(costmap: Mapping[str, Any]) -> bool:

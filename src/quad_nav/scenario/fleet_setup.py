@@ -8,7 +8,8 @@ from typing import Any, Dict, Mapping
 from quad_nav.config import Configuration
 from quad_nav.errors import InputError
 from quad_nav.files.values import unknown_names, value_faults
-from quad_nav.scenario.rules import RANDOM, RULES
+from quad_nav.scenario import RANDOM
+from quad_nav.scenario.rules import RULES
 from quad_nav.scenario.scenario import area_of, read_configurations
 
 DEFAULTS: Dict[str, Any] = {

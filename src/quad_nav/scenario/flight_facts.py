@@ -13,8 +13,8 @@ from typing import Any, Dict, Mapping, Optional, Sequence
 from quad_nav.config.differences import Trees, difference_list
 from quad_nav.files.shipped import shipped
 from quad_nav.files.values import is_number
+from quad_nav.scenario import RANDOM
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup
-from quad_nav.scenario.rules import RANDOM
 from quad_nav.scenario.simulator_setup import DEFAULT_BEAMS
 from quad_nav.scenario.simulator_setup import DEFAULTS as SIMULATOR_DEFAULTS
 from quad_nav.sim.flight import airframe_name
@@ -28,13 +28,7 @@ SHIPPED = "shipped"
 def offline_facts(
     options: FlightOptions, setup: FlightSetup, command: Sequence[str] = ()
 ) -> Dict[str, Any]:
-    """Return the facts of an offline flight.
-
-    Args:
-        options: Options of the flight.
-        setup: What ``read_setup`` made of them.
-        command: Command line of the program.
-    """
+    """Return the facts of an offline flight; ``read_setup`` made the setup of the options."""
     simulation = setup.simulation
     trees = {
         robot.name: configuration.to_tree()

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, List, Optional, Sequence, Tuple
 
 from quad_nav.config import Configuration
 from quad_nav.config.other_robots import input_faults
@@ -15,15 +15,20 @@ from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
 from quad_nav.files.values import value_faults
 from quad_nav.mission.robot_goals import RobotGoals
+from quad_nav.scenario import RANDOM
 from quad_nav.scenario.coverage import scene_bounds
-from quad_nav.scenario.rules import RANDOM, RULES, steps_per_scan
-from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configurations, read_scenario
+from quad_nav.scenario.rules import RULES, steps_per_scan
+from quad_nav.scenario.scenario import (
+    Scenario,
+    ScenarioRequest,
+    read_configurations,
+    read_scenario,
+    tried,
+)
 from quad_nav.scenario.scene_map import scene_map_problem
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.simulation_params import SimulationParams
 from quad_nav.sim.start_poses import start_poses
-
-_RULES = {name: RULES[name] for name in ("lidar_rate", "jitter", "time_limit")}
 
 
 @dataclass(frozen=True)
@@ -92,19 +97,15 @@ def read_setup(options: FlightOptions) -> FlightSetup:
     """
     given_goals = options.goals
     options = with_default_files(options)
-    problems = value_faults(_values(options), _RULES, "")
+    problems = _value_faults(options)
     scenario, faults = read_scenario(_request(options), partial(_configurations, options))
     problems += faults
     scene, robots = scenario.scene, scenario.robots
     airframe = replace(options.simulation.airframe, radius_m=scenario.robot_radius_m)
     simulation = replace(options.simulation, airframe=airframe)
     if scene is not None and not problems:
-        try:
-            start_poses(
-                scene, len(robots), simulation.jitter_m, options.seed, simulation.airframe.radius_m
-            )
-        except InputError as error:
-            problems += error.problems
+        poses = partial(start_poses, scene, len(robots), simulation.jitter_m, options.seed)
+        tried(partial(poses, airframe.radius_m), problems)
     configurations = tuple(one for one in scenario.configurations if one is not None)
     if scene is not None:
         problems += _map_faults(scene, configurations)
@@ -144,21 +145,21 @@ def read_readable_parts(options: FlightOptions) -> Scenario:
 
 def _map_faults(scene: Scene, configurations: Sequence[Configuration]) -> List[str]:
     """A message for each costmap whose static layers cannot hold the scene."""
-    found = {
-        f"quad{number}: {name}: {scene_map_problem(scene, getattr(one, name))}": None
+    found = (
+        (f"quad{number}: {name}", scene_map_problem(scene, costmap))
         for number, one in enumerate(configurations)
-        for name in ("global_costmap", "local_costmap")
-        if scene_map_problem(scene, getattr(one, name))
-    }
-    return list(found)
+        for name, costmap in one.costmaps.items()
+    )
+    return [f"{place}: {problem}" for place, problem in found if problem]
 
 
-def _values(options: FlightOptions) -> Dict[str, Any]:
-    return {
+def _value_faults(options: FlightOptions) -> List[str]:
+    values = {
         "lidar_rate": options.scans_per_s,
         "jitter": options.simulation.jitter_m,
         "time_limit": options.time_limit_s,
     }
+    return value_faults(values, {name: RULES[name] for name in values}, "")
 
 
 def with_default_files(options: FlightOptions) -> FlightOptions:

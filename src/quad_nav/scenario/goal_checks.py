@@ -33,17 +33,13 @@ OFF_COSTMAP = "is off the global costmap"
 
 def scene_check(scene: Scene, robot_radius_m: float) -> PlaceCheck:
     """Check for positions in the arena, at least ``robot_radius_m`` from walls and obstacles."""
-    return clearance_check(
-        scene.contains,
-        scene.flight_surface_distance_m,
-        robot_radius_m,
-        area_text(scene_bounds(scene)),
-    )
+    distance_m, area = scene.flight_surface_distance_m, area_text(scene_bounds(scene))
+    return clearance_check(scene.contains, distance_m, robot_radius_m, area)
 
 
 def costmap_check(costmap: CostmapParams) -> Optional[PlaceCheck]:
-    """Check for positions on a global costmap; None if it has no fixed place (see ``_bounds``)."""
-    bounds = _bounds(costmap)
+    """Check for positions on a global costmap; None without a fixed place, see ``bounds_of``."""
+    bounds = bounds_of(costmap)
     if bounds is None:
         return None
     low_x, low_y, high_x, high_y = bounds
@@ -51,10 +47,8 @@ def costmap_check(costmap: CostmapParams) -> Optional[PlaceCheck]:
     def check(x_m: float, y_m: float) -> Optional[str]:
         if low_x <= x_m < high_x and low_y <= y_m < high_y:
             return None
-        return (
-            f"{OFF_COSTMAP}, {area_text(bounds)}; expected a position on it, or a global_costmap "
-            "that covers it"
-        )
+        expected = "expected a position on it, or a global_costmap that covers it"
+        return f"{OFF_COSTMAP}, {area_text(bounds)}; {expected}"
 
     return check
 
@@ -100,10 +94,7 @@ def with_planner_tolerance(
 ) -> SequenceSettings:
     """Return settings with the local planner's yaw tolerance if they have none of their own.
 
-    Args:
-        settings: Settings that a goal file does not give.
-        configuration: The robot's, None if it is unknown. A planner of the user's need not have
-            a ``yaw_goal_tolerance``.
+    The configuration may be unknown, and a planner of the user's without ``yaw_goal_tolerance``.
     """
     planners_rad = getattr(configuration and configuration.local_planner, _YAW_FIELD, None)
     if settings.yaw_tolerance_rad is not None or planners_rad is None:
@@ -111,39 +102,24 @@ def with_planner_tolerance(
     return replace(settings, yaw_tolerance_rad=planners_rad)
 
 
-def tolerance_warnings(
+def file_warnings(
     robots: Sequence[RobotGoals], configurations: Sequence[Optional[Configuration]]
 ) -> List[str]:
-    """A warning for each goal file whose tolerances the local planner may not reach.
-
-    It is no fault: the robot usually stops nearer than the planner's tolerance demands.
-    """
-    warnings = []
-    for robot, configuration in zip(robots, configurations):
-        planner = configuration.local_planner if configuration else None
-        sequence = robot.sequence
-        near_m = min(map(sequence.tolerance_m, sequence.goals))
-        turned = [goal for goal in sequence.goals if goal.yaw_rad is not None]
-        near_rad = min(map(sequence.yaw_tolerance_rad, turned), default=math.inf)
-        for value, unit, name, field in (
-            (near_m, "m", "xy_goal_tolerance", "xy_goal_tolerance_m"),
-            (near_rad, "rad", "yaw_goal_tolerance", _YAW_FIELD),
-        ):
-            planners = getattr(planner, field, 0.0)
-            if value < planners:
-                warnings.append(
-                    f"{robot.file.path}: a tolerance of {value:g} {unit} is below the local "
-                    f"planner's {name}, {planners:g} {unit}: the quadcopter may stop outside, and "
-                    f"the goal would be skipped; expected {planners:g} {unit} or more, or a "
-                    f"smaller {name}"
-                )
-    return warnings
+    """The warnings of each goal file, with its name."""
+    planners = [one.local_planner if one else None for one in configurations]
+    return [
+        f"{robot.file.path}: {line}"
+        for robot, planner in zip(robots, planners)
+        for line in robot.sequence.warnings(
+            getattr(planner, "xy_goal_tolerance_m", 0.0), getattr(planner, _YAW_FIELD, 0.0)
+        )
+    ]
 
 
 def coverage_notes(configurations: Sequence[Optional[Configuration]]) -> List[str]:
     """A line for each size of global costmaps that is the scene's, with the robots' names."""
     sizes = [
-        _bounds(one.global_costmap) if one and one.tree.get(SIZE_FROM_SCENE) else None
+        bounds_of(one.global_costmap) if one and one.tree.get(SIZE_FROM_SCENE) else None
         for one in configurations
     ]
     return [
@@ -158,12 +134,8 @@ def cover_warnings(
 ) -> List[str]:
     """A warning for each global costmap that ends within the arena, with the robots that use it.
 
-    It is no fault: the mission may stay in the part that is covered.
-
-    Args:
-        scene: The scene.
-        configurations: The robots' configurations, as far as they are known.
-        in_a_file: The user sets parameters in files, not on the command line.
+    It is no fault: the mission may stay in the part that is covered. ``in_a_file`` tells that the
+    user sets parameters in files, not on the command line.
     """
     area = scene_bounds(scene)
     small = [_bounds_if_small(one, area) for one in configurations]
@@ -180,7 +152,7 @@ def cover_warnings(
 
 def _bounds_if_small(configuration: Optional[Configuration], area: Bounds) -> Optional[Bounds]:
     costmap = configuration.global_costmap if configuration else None
-    bounds = _bounds(costmap) if costmap else None
+    bounds = bounds_of(costmap) if costmap else None
     return bounds if costmap and bounds and not covers(bounds, area, costmap.resolution_m) else None
 
 
@@ -201,7 +173,7 @@ def _expected_size(area: Bounds, configuration: Optional[Configuration], in_a_fi
     )
 
 
-def _bounds(costmap: CostmapParams) -> Optional[Bounds]:
+def bounds_of(costmap: CostmapParams) -> Optional[Bounds]:
     """The area that a costmap covers; None if it follows the robot or takes its map's size."""
     has_map = any(isinstance(layer, StaticLayerParams) for _, layer in costmap.layers)
     if costmap.rolling_window or has_map:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import zlib
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
@@ -15,14 +16,15 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 from quad_nav.config import Configuration
 from quad_nav.errors import InputError
 from quad_nav.files.output import output_faults
-from quad_nav.files.values import Rule, expected_name, value_faults
+from quad_nav.files.values import expected_name, optional, value_faults
 from quad_nav.mission.distances import SurfaceDistance
 from quad_nav.mission.goal_file import SETTINGS, SequenceSettings, read_settings
 from quad_nav.mission.robot_goals import RobotGoals
+from quad_nav.scenario import RANDOM
 from quad_nav.scenario.coverage import scene_bounds
 from quad_nav.scenario.flight_facts import ros_facts
-from quad_nav.scenario.navigator_parameters import load_navigator
-from quad_nav.scenario.rules import RANDOM, RULES, START_S, optional
+from quad_nav.scenario.navigator_parameters import load_navigators
+from quad_nav.scenario.rules import RULES, START_S
 from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configurations, read_scenario
 from quad_nav.sim.crowd_record import CrowdRecord
 from quad_nav.sim.movers import Movers
@@ -49,22 +51,9 @@ DEFAULTS: Dict[str, Any] = {
     "journal": "",
 }
 # ``read_scenario`` checks the others.
-_RULES: Dict[str, Rule] = {
-    "config": optional(RULES["config"]),
-    **{
-        name: RULES[name]
-        for name in (
-            "simulation",
-            "start_service",
-            "end_service",
-            "ready_timeout",
-            "exit_when_done",
-            "result",
-            "resume",
-            "journal",
-        )
-    },
-}
+_OWN = ["simulation", "start_service", "end_service", "ready_timeout", "exit_when_done"]
+_OWN += ["result", "resume", "journal"]
+_RULES = {"config": optional(RULES["config"]), **{name: RULES[name] for name in _OWN}}
 
 
 @dataclass(frozen=True)
@@ -124,7 +113,7 @@ def read_setup(
     settings, faults = read_settings({k: values[k] for k in SETTINGS if k in values}, name)
     problems = value_faults(values, _RULES, name) + _output_faults(values, result, name) + faults
     request = _request(values, settings, name, all_parameters)
-    scenario, faults = read_scenario(request, _Navigators(values, all_parameters))
+    scenario, faults = read_scenario(request, partial(_navigators, values, all_parameters))
     if problems + faults:
         raise InputError(list(dict.fromkeys(problems + faults)))
     warnings = (*_unknown_parameters(parameters, name), *scenario.warnings)
@@ -179,32 +168,20 @@ def _mission_setup(
     )
 
 
-class _Navigators:
-    """Reads the navigators' configurations, from a fleet's files or from the parameter server."""
-
-    def __init__(self, values: Mapping[str, Any], all_parameters: Mapping[str, Any]) -> None:
-        self._folder = values["config"]
-        self._all_parameters = all_parameters
-
-    def __call__(self, robots: int, scene: Optional[Scene]) -> Sequence[Optional[Configuration]]:
-        if self._folder and isinstance(self._folder, str):
-            area = scene_bounds(scene) if scene else None
-            return read_configurations(self._folder, robots, area, numbered=True)
-        configurations: List[Optional[Configuration]] = []
-        problems: List[str] = []
-        for number in range(robots):
-            tree = self._all_parameters.get(f"move_base{number}")
-            try:
-                configurations.append(
-                    None
-                    if tree is None
-                    else load_navigator(tree, f"/move_base{number}", self._all_parameters)
-                )
-            except InputError as error:
-                problems += error.problems
-        if problems:
-            raise InputError(problems)
-        return configurations
+def _navigators(
+    values: Mapping[str, Any],
+    all_parameters: Mapping[str, Any],
+    robots: int,
+    scene: Optional[Scene],
+) -> Sequence[Optional[Configuration]]:
+    """Read the navigators' configurations, from a fleet's files or from the parameter server."""
+    if values["config"] and isinstance(values["config"], str):
+        area = scene_bounds(scene) if scene else None
+        return read_configurations(values["config"], robots, area, numbered=True)
+    trees = {i: all_parameters.get(f"move_base{i}") for i in range(robots)}
+    given = {i: tree for i, tree in trees.items() if tree is not None}
+    found = load_navigators(given, all_parameters)
+    return [found.get(i) for i in trees]
 
 
 def _journal_path(values: Mapping[str, Any], journals: Path) -> Path:

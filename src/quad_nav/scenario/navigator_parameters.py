@@ -8,12 +8,13 @@ parameters for this robot, stay.
 from __future__ import annotations
 
 from copy import deepcopy
-from typing import Any, Dict, Mapping
+from typing import Any, Dict, List, Mapping
 
 from quad_nav import config
 from quad_nav.config import Configuration
 from quad_nav.config.files import ParameterTree
 from quad_nav.config.robot_tree import COMMAND_LINE
+from quad_nav.errors import InputError
 from quad_nav.scenario.coverage import COSTMAP, cover_area
 
 COVER_SCENE, OVERRIDE = "cover_scene", "override"
@@ -38,6 +39,26 @@ def load_navigator(
     if tree.get(COVER_SCENE) is True and isinstance(simulator, Mapping):
         parameters = _sized(parameters, tree.get(OVERRIDE), simulator)
     return config.load(parameters, name)
+
+
+def load_navigators(
+    trees: Mapping[int, Any], all_parameters: Mapping[str, Any]
+) -> Dict[int, Configuration]:
+    """Load the parameters of the nodes ``move_base{i}`` by their trees on the server.
+
+    Raises:
+        InputError: Every fault in any of them.
+    """
+    found: Dict[int, Configuration] = {}
+    problems: List[str] = []
+    for number, tree in trees.items():
+        try:
+            found[number] = load_navigator(tree, f"/move_base{number}", all_parameters)
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    return found
 
 
 def _sized(

@@ -25,7 +25,7 @@ from quad_nav.scenario.flight_setup import (
     read_setup,
     with_default_files,
 )
-from quad_nav.scenario.goal_checks import place_check
+from quad_nav.scenario.goal_checks import bounds_of, place_check
 from quad_nav.scenario.scene_map import scene_map, scene_map_problem, scene_occupancy
 from quad_nav.sim.movers import Movers
 from quad_nav.sim.obstacles import Obstacle
@@ -129,12 +129,7 @@ class MissionPreview:
         return place_check(self.scene, self.robot_radius_m, self._configurations.get(number))
 
     def robot(self, number: int, sequence: Optional[GoalSequence] = None) -> RobotPreview:
-        """Check and plan a robot's goals.
-
-        Args:
-            number: The robot's number.
-            sequence: Its goals; None for those of its file.
-        """
+        """Check and plan a robot's goals, those of its file unless others are given."""
         sequence = sequence or self._sequences[number]
         check = self.check(number)
         faults = tuple(check(goal.x_m, goal.y_m) or "" for goal in sequence.goals)
@@ -182,19 +177,13 @@ class MissionPreview:
         configuration = self._configurations.get(number)
         if configuration is None or self.scene is None:
             return None
-        params, follows = _without_sensors(configuration.global_costmap), _follows(configuration)
-        if follows and scene_map_problem(self.scene, params):
+        params = _without_sensors(configuration.global_costmap)
+        has_no_place = bounds_of(configuration.global_costmap) is None
+        if has_no_place and scene_map_problem(self.scene, params):
             return None  # a scene of kilometres in cells of centimetres
         if params not in self._costmaps:
-            self._costmaps[params] = _costmap(params, self.scene, follows)
+            self._costmaps[params] = _costmap(params, self.scene, has_no_place)
         return self._costmaps[params]
-
-
-def _follows(configuration: Configuration) -> bool:
-    """True for a global costmap that takes its map's size or follows the robot."""
-    costmap = configuration.global_costmap
-    has_map = any(isinstance(layer, StaticLayerParams) for _, layer in costmap.layers)
-    return has_map or costmap.rolling_window
 
 
 def _without_sensors(params: CostmapParams) -> CostmapParams:

@@ -23,10 +23,10 @@ from quad_nav.config.files import set_value
 from quad_nav.config.notes import LEFT_OUT, MAPPED, OTHER_ROBOT
 from quad_nav.config.robot_tree import RobotSource, plain_tree, robot_tree
 from quad_nav.errors import InputError, printable
+from quad_nav.scenario import RANDOM
 from quad_nav.scenario.coverage import Bounds, cover_area, scene_bounds
 from quad_nav.sim.scene_file import load_scene
 
-RANDOM = "random"  # as in scenario.rules, which imports the engine
 COLLECT = "QUAD_COLLECT_FAULTS"
 FAULTS = "files_with_faults"
 """Parameter that has the faults while they are collected."""

@@ -9,18 +9,16 @@ from quad_nav.files.values import (
     Rule,
     choice,
     is_number,
-    is_whole,
     number,
-    optional_text,
+    optional,
     text,
     whole,
 )
+from quad_nav.scenario import RANDOM
 from quad_nav.sim.flight import AIRFRAMES
 from quad_nav.sim.odometry import MAX_DRIFT
 from quad_nav.sim.simulation_params import LIDAR_CASTERS, STEPS_PER_S
 
-RANDOM = "random"
-"""Value of ``scene`` and ``goals`` that asks for a random mission."""
 START_S = 1.0
 """Time on `/clock` when a simulation starts: rospy treats 0 as a clock without messages."""
 MAX_SIZE_M = 250  # a larger random arena takes minutes to fill with obstacles
@@ -99,29 +97,16 @@ RULES: Dict[str, Rule] = {
         lambda value: isinstance(value, (int, float)) and value > 0, "a number of seconds above 0"
     ),
     "simulation": BOOLEAN,
-    "start_service": optional_text("the name of a service"),
-    "end_service": optional_text("the name of a service"),
+    "start_service": optional(text("the name of a service")),
+    "end_service": optional(text("the name of a service")),
     "ready_timeout": number(above=0, unit="seconds"),
     "exit_when_done": BOOLEAN,
     "resume": BOOLEAN,
-    "result": optional_text("a file to write"),
-    "journal": optional_text("a file to write"),
+    "result": optional(text("a file to write")),
+    "journal": optional(text("a file to write")),
     # A fleet's processes.
     "hosts": whole(at_least=1),
     "host": Rule(whole(at_least=0).accepts, "a whole number below hosts"),
     "composed": BOOLEAN,
     "separate": Rule(_is_packages, "packages of navigators, such as {nav3: move_base}"),
 }
-
-
-def optional(rule: Rule) -> Rule:
-    """The same rule, which also accepts an empty text."""
-    return Rule(lambda value: value == "" or rule.accepts(value), f"{rule.expected}, or nothing")
-
-
-def optional_whole(rule: Rule) -> Rule:
-    """The same rule for a whole number, which also accepts 0."""
-    return Rule(
-        lambda value: (is_whole(value) and value == 0) or rule.accepts(value),
-        f"{rule.expected}, or 0",
-    )

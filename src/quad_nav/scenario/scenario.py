@@ -17,7 +17,7 @@ from quad_nav.config import Configuration
 from quad_nav.config.notes import without_effect
 from quad_nav.config.robot_tree import RobotSource, robot_tree
 from quad_nav.errors import InputError
-from quad_nav.files.values import value_faults
+from quad_nav.files.values import optional, value_faults
 from quad_nav.mission.goal_file import DEFAULT_SETTINGS, SequenceSettings
 from quad_nav.mission.robot_goals import (
     RobotGoals,
@@ -25,18 +25,19 @@ from quad_nav.mission.robot_goals import (
     last_goal_conflicts,
     load_robot_goals,
 )
+from quad_nav.scenario import RANDOM
 from quad_nav.scenario.coverage import Bounds, cover_area, scene_bounds
 from quad_nav.scenario.goal_checks import (
     OFF_COSTMAP,
     cover_warnings,
     coverage_notes,
+    file_warnings,
     goals_off_the_costmap,
     place_check,
-    tolerance_warnings,
     with_planner_tolerance,
 )
 from quad_nav.scenario.random_mission import RandomMission, random_mission
-from quad_nav.scenario.rules import RANDOM, RULES, optional
+from quad_nav.scenario.rules import RULES
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.scene_file import load_scene
 
@@ -112,8 +113,8 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
     problems = value_faults(vars(request), _REQUEST_RULES, request.source)
     request = _without_faulty_values(request)
     values = vars(request)
-    mission, scene = _tried(lambda: (mission_of(values), _scene(values)), problems) or (None, None)
-    configurations = _tried(lambda: tuple(configure(request.robots, scene)), problems) or ()
+    mission, scene = tried(lambda: (mission_of(values), _scene(values)), problems) or (None, None)
+    configurations = tried(lambda: tuple(configure(request.robots, scene)), problems) or ()
     if configurations:
         radius = body_radius_m(configurations, request.robot_radius)
         request = replace(request, robot_radius=radius)
@@ -129,7 +130,7 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
         faults += small
     warnings = (
         *last_goal_conflicts(robots, request.robot_radius),
-        *tolerance_warnings(robots, configurations),
+        *file_warnings(robots, configurations),
         *small,
     )
     notes = tuple(coverage_notes(configurations))
@@ -141,9 +142,7 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
 def body_radius_m(configurations: Sequence[Optional[Configuration]], own_m: float) -> float:
     """Return the radius of the simulated bodies, the largest that the configurations ask for.
 
-    Args:
-        configurations: Those of all robots.
-        own_m: Radius of a quadcopter without ``body_radius``.
+    ``own_m`` is that of a quadcopter without ``body_radius``.
     """
     radii = [one.body_radius_m if one else None for one in configurations]
     return max((own_m if one is None else one for one in radii), default=own_m)
@@ -306,7 +305,7 @@ def _goal_files(request: ScenarioRequest) -> Tuple[Dict[int, Path], List[str]]:
     return {number: Path(path).expanduser() for number, path in enumerate(goals)}, problems
 
 
-def _tried(read: Callable[[], T], problems: List[str]) -> Optional[T]:
+def tried(read: Callable[[], T], problems: List[str]) -> Optional[T]:
     """Return what ``read`` returns, or None with its faults added to ``problems``."""
     try:
         return read()

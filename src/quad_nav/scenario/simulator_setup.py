@@ -10,9 +10,9 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence
 from quad_nav.config import Configuration, load
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.errors import InputError
-from quad_nav.files.values import is_number, is_whole, unknown_names, value_faults
-from quad_nav.scenario.navigator_parameters import load_navigator
-from quad_nav.scenario.rules import RULES, optional, optional_whole, steps_per_scan
+from quad_nav.files.values import is_number, is_whole, optional, unknown_names, value_faults
+from quad_nav.scenario.navigator_parameters import load_navigators
+from quad_nav.scenario.rules import RULES, steps_per_scan
 from quad_nav.scenario.scenario import (
     area_of,
     body_radius_m,
@@ -55,7 +55,7 @@ DEFAULTS: Dict[str, Any] = {
 _RULES = {
     **{name: RULES[name] for name in DEFAULTS},
     "config": optional(RULES["config"]),
-    "hosts": optional_whole(RULES["hosts"]),
+    "hosts": optional(RULES["hosts"], 0),
 }
 
 
@@ -106,7 +106,8 @@ def read_setup(
         values = {**DEFAULTS, **_asked_for(fleet), **parameters}
         hosted = {number: fleet[number] for number in _hosted(values)}
     else:
-        hosted = _on_the_server(all_parameters, _hosted(values))
+        trees = {i: all_parameters.get(f"move_base{i}", {}) for i in _hosted(values)}
+        hosted = load_navigators(trees, all_parameters)
     return SimulatorSetup(
         scene,
         values["robots"],
@@ -157,31 +158,10 @@ def _host_faults(values: Mapping[str, Any], name: str) -> List[str]:
     return [f"{name}: hosts {values['hosts']} for {count} robots; expected a robot for each host"]
 
 
-def _on_the_server(
-    all_parameters: Mapping[str, Any], numbers: Sequence[int]
-) -> Dict[int, Configuration]:
-    """Read the configurations of navigators that have their parameters on the server."""
-    found: Dict[int, Configuration] = {}
-    problems: List[str] = []
-    for number in numbers:
-        try:
-            tree = all_parameters.get(f"move_base{number}", {})
-            found[number] = load_navigator(tree, f"/move_base{number}", all_parameters)
-        except InputError as error:
-            problems += error.problems
-    if problems:
-        raise InputError(problems)
-    return found
-
-
 def asked_for_by_navigators(all_parameters: Mapping[str, Any], robots: Any) -> Dict[str, Any]:
     """Return parameters of the simulator that follow from those of navigators on the server.
 
     Navigators with faults are left out; they name their faults themselves.
-
-    Args:
-        all_parameters: The whole parameter tree, with those of ``move_base{i}``.
-        robots: Number of robots.
     """
     configurations: List[Optional[Configuration]] = []
     for number in range(robots if is_whole(robots) else 0):
@@ -191,7 +171,7 @@ def asked_for_by_navigators(all_parameters: Mapping[str, Any], robots: Any) -> D
                 configurations.append(load(tree))
             except InputError:
                 continue
-    period_s = longest_controller_period_s(all_parameters, robots)
+    period_s = _longest_controller_period_s(all_parameters, robots)
     return {**_asked_for(configurations), "controller_period": period_s}
 
 
@@ -216,7 +196,7 @@ def _asked_for(configurations: Sequence[Optional[Configuration]]) -> Dict[str, A
     }
 
 
-def longest_controller_period_s(all_parameters: Mapping[str, Any], robots: Any) -> float:
+def _longest_controller_period_s(all_parameters: Mapping[str, Any], robots: Any) -> float:
     """Return the longest control period of navigators that have their parameters on the server.
 
     The watchdog for commands waits for it: a controller of 1 Hz pauses for 1 s between two

@@ -38,22 +38,11 @@ _LIDAR: Dict[str, Any] = {
 _COSTMAP: Dict[str, Any] = {"observation_sources": "scan", "scan": _LIDAR}
 _VOXELS: Dict[str, Any] = {**_COSTMAP, "map_type": "voxel"}
 # Together they call every planner, both kinds of search and path, and both obstacle layers.
+_SEARCH: Dict[str, Any] = {"base_global_planner": "global_planner/GlobalPlanner"}
 _MISSIONS: Tuple[Tuple[Dict[str, Any], Dict[str, Any]], ...] = (  # costmap, the node's own
     (_COSTMAP, {}),
-    (
-        _COSTMAP,
-        {
-            "base_local_planner": "dwa_local_planner/DWAPlannerROS",
-            "base_global_planner": "global_planner/GlobalPlanner",
-        },
-    ),
-    (
-        _VOXELS,
-        {
-            "base_global_planner": "global_planner/GlobalPlanner",
-            "GlobalPlanner": {"use_dijkstra": False, "use_grid_path": True},
-        },
-    ),
+    (_COSTMAP, {"base_local_planner": "dwa_local_planner/DWAPlannerROS", **_SEARCH}),
+    (_VOXELS, {"GlobalPlanner": {"use_dijkstra": False, "use_grid_path": True}, **_SEARCH}),
     (_COSTMAP, {"base_global_planner": "carrot_planner/CarrotPlanner"}),
 )
 
@@ -112,7 +101,7 @@ def _add_scans(navigator: Navigator, here: Pose2D) -> None:
                     cloud = np.zeros((1, 3), np.float32)
                     layer.add_cloud(source.name, cloud, lidar, 0.0, 0.0)
                     seen = layer.observe_scan(source.name, scan, lidar, None, is_moving)
-                    layer.add_observation(source.name, seen, 0.0)
+                    layer.buffers[source.name].add(seen, 0.0)
 
 
 def simulate() -> None:
@@ -149,20 +138,9 @@ def fly_missions() -> None:
     """Call every kernel that any configuration may call."""
     simulate()
     for costmap, node in _MISSIONS:
-        warm_up(
-            config.load(
-                {
-                    **node,
-                    "global_costmap": dict(costmap),
-                    "local_costmap": {
-                        **costmap,
-                        "rolling_window": True,
-                        "width": 3.0,
-                        "height": 3.0,
-                    },
-                }
-            )
-        )
+        rolling = {**costmap, "rolling_window": True, "width": 3.0, "height": 3.0}
+        tree = {**node, "global_costmap": dict(costmap), "local_costmap": rolling}
+        warm_up(config.load(tree))
 
 
 def fly_shipped() -> None:

@@ -1,9 +1,9 @@
 """Simulator: scenes, rigid bodies, flight controller, LIDARs and contacts, without ROS.
 
-Reading order: ``scene`` (arena and obstacles), ``simulation`` (the steps), ``flight`` (controller),
-``body`` (pybullet) and ``free_flight`` (without it), ``contacts``, ``lidar`` and ``casters`` with
-``solids``. Their loops are in ``flight_law``, ``rigid_body``, ``lidar_kernel``, ``rays`` and
-``sectors``. ``scene_file`` reads scenes, ``scene_writer`` writes them, and ``imported_scene`` makes
-them of Gazebo worlds (``world_file``) and maps (``map_file``). ``pacing`` relates simulated time to
-wall time, ``colours`` has a colour for each quadcopter.
+Reading order: ``obstacles`` (their shapes), ``scene`` (the arena), ``simulation`` (the steps),
+``flight`` (controller), ``body`` (pybullet) and ``free_flight`` (without it), ``contacts``,
+``lidar`` and ``casters`` with ``solids``. Their loops are in ``flight_law``, ``rigid_body``,
+``lidar_kernel``, ``rays`` and ``sectors``. ``scene_file`` reads scenes, ``scene_writer`` writes
+them, and ``imported_scene`` makes them of Gazebo worlds (``world_file``, ``sdf``) and maps
+(``map_file``). ``pacing`` relates simulated time to wall time.
 """

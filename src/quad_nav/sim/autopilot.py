@@ -42,14 +42,7 @@ def flight_params(airframe: Airframe, params: FlightParams) -> FlightParams:
 
 
 class Autopilot:
-    """Autopilots of ``n_robots`` quadcopters.
-
-    Args:
-        response: Response to set-points.
-        law: Flight controller that flies the bodies.
-        n_robots: Number of quadcopters.
-        step_s: Length of a step.
-    """
+    """Autopilots of ``n_robots`` quadcopters, whose bodies ``law`` flies in steps of ``step_s``."""
 
     def __init__(
         self, response: AutopilotResponse, law: FlightLaw, n_robots: int, step_s: float
@@ -71,14 +64,7 @@ class Autopilot:
         self._rotation = np.empty((3, 3))
 
     def receive(self, robot: int, command: Floats, state: BodyState, step: int) -> None:
-        """Take a set-point.
-
-        Args:
-            robot: Number of the quadcopter.
-            command: float64[3], (vx, vy, vyaw) in m/s and rad/s in the body's frame.
-            state: Present state of the quadcopters.
-            step: Number of the next step.
-        """
+        """Take a set-point float64[3], (vx, vy, vyaw) in the body's frame, before a step."""
         self._in_force[robot] = step, command.copy()
         limit = self._response.max_yaw_rate_radps
         vx, vy, vyaw = command.tolist()
@@ -91,14 +77,11 @@ class Autopilot:
         self._yaw_rates[robot].append(step + self._yaw_steps, (vyaw,))
 
     def commands(self, state: BodyState, step: int) -> Floats:
-        """Return the flight controller's commands for a step.
-
-        Args:
-            state: State of the quadcopters before the step.
-            step: Number of the step; the same number again returns the same commands.
+        """Return the flight controller's commands for a step from the state before it.
 
         Returns:
-            float64[n, 3], (vx, vy, vyaw) in the bodies' frames; valid until the next step.
+            float64[n, 3], (vx, vy, vyaw) in the bodies' frames; valid until the next step. The same
+            step again returns the same commands.
         """
         if step != self._step:
             self._step = step

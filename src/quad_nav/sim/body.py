@@ -243,7 +243,12 @@ class World:
         return [touches[key] for key in sorted(touches)]
 
     def cast(self, starts_m: Floats, ends_m: Floats) -> Floats:
-        """Cast rays; see ``casters.RayWorld``. Beams start inside the robot's own guard."""
+        """Cast rays from and to float64[m, 3] in ``map``.
+
+        Returns:
+            float64[m], distance to the first hit as a fraction of the ray's length; +inf for no
+            hit. A ray does not hit a solid that it starts in, such as its own quadcopter's guard.
+        """
         self._rebuild()
         starts, ends = starts_m.tolist(), ends_m.tolist()
         hits: List[float] = []
@@ -268,11 +273,10 @@ class World:
             shape = pybullet.createVisualShape(
                 pybullet.GEOM_SPHERE, radius=radius, rgbaColor=rgba, physicsClientId=client
             )
-            self._goal_ids.append(
-                pybullet.createMultiBody(
-                    0.0, baseVisualShapeIndex=shape, basePosition=centre, physicsClientId=client
-                )
+            body = pybullet.createMultiBody(
+                0.0, baseVisualShapeIndex=shape, basePosition=centre, physicsClientId=client
             )
+            self._goal_ids.append(body)
 
     def _draw(self, on: bool) -> None:
         """Switch drawing on or off; adding bodies is slow while it is on."""
@@ -290,29 +294,26 @@ class World:
         )
 
     def _touch(self, body_a: int, body_b: int, position: Tuple[float, float, float]) -> Touch:
-        numbers = sorted(
-            self._robots.index(body) for body in (body_a, body_b) if body not in self._names
+        robots = sorted(
+            self._robots.index(one) for one in (body_a, body_b) if one not in self._names
         )
-        other: Optional[int] = numbers[1] if len(numbers) == 2 else None
-        name = (
-            f"quad{other}"
-            if other is not None
-            else self._names[body_a if body_a in self._names else body_b]
-        )
-        return Touch(numbers[0], name or self._scene.nearest(*position).name, position)
+        if len(robots) == 2:
+            return Touch(robots[0], f"quad{robots[1]}", position)
+        name = self._names[body_a if body_a in self._names else body_b]
+        return Touch(robots[0], name or self._scene.nearest(*position).name, position)
 
     def _add_obstacle(self, solid: Obstacle) -> int:
         kind, sizes = _GEOMETRIES[solid.shape](solid)
         shape = pybullet.createCollisionShape(kind, physicsClientId=self._client, **sizes)
-        return int(
-            pybullet.createMultiBody(
-                0.0,
-                shape,
-                basePosition=solid.centre_m,
-                baseOrientation=quaternion_from_yaw(solid.yaw_rad),
-                physicsClientId=self._client,
-            )
+        turn = quaternion_from_yaw(solid.yaw_rad)
+        body = pybullet.createMultiBody(
+            0.0,
+            shape,
+            basePosition=solid.centre_m,
+            baseOrientation=turn,
+            physicsClientId=self._client,
         )
+        return int(body)
 
     def _add_boxes(self, boxes: Sequence[Box]) -> int:
         """Add boxes as one body, because each step visits all bodies."""
@@ -323,11 +324,9 @@ class World:
             collisionFrameOrientations=[quaternion_from_yaw(box.yaw_rad) for box in boxes],
             physicsClientId=self._client,
         )
-        return int(
-            pybullet.createMultiBody(
-                0.0, shape, useMaximalCoordinates=1, physicsClientId=self._client
-            )
-        )
+        client = self._client
+        body = pybullet.createMultiBody(0.0, shape, useMaximalCoordinates=1, physicsClientId=client)
+        return int(body)
 
     def _add_quadcopter(self, number: int, start: Pose2D) -> int:
         client, offset = self._client, [0.0, 0.0, MOUNT_HEIGHT_M]
@@ -377,9 +376,8 @@ def _connect(gui: bool) -> int:
         raise InputError([f"gui: no display at DISPLAY={display!r}, expected one, or gui:=false"])
     client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
     if client < 0:
-        raise InputError(
-            ["gui: pybullet cannot open its window, expected a display, or gui:=false"]
-        )
+        problem = "gui: pybullet cannot open its window, expected a display, or gui:=false"
+        raise InputError([problem])
     return int(client)
 
 

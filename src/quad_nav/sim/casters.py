@@ -6,7 +6,7 @@ shapes. The kernel is exact and about ten times as fast.
 
 from __future__ import annotations
 
-from typing import List, Protocol, Sequence
+from typing import Callable, List, Protocol, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,28 +38,12 @@ class Caster(Protocol):
         """
 
 
-class RayWorld(Protocol):
-    """World with bodies that rays can hit, such as ``body.World``."""
-
-    def cast(self, starts_m: Floats, ends_m: Floats) -> Floats:
-        """Cast rays.
-
-        Args:
-            starts_m: float64[m, 3], in ``map``.
-            ends_m: float64[m, 3], in ``map``.
-
-        Returns:
-            float64[m], distance to the first hit as a fraction of the ray's length; +inf for no
-            hit. A ray does not hit a solid that it starts in.
-        """
-
-
 class WorldCaster:
-    """Caster that uses the bodies of the physics engine's world."""
+    """Caster that uses the bodies of the physics engine's world, by ``body.World.cast``."""
 
-    def __init__(self, params: LidarParams, world: RayWorld) -> None:
+    def __init__(self, params: LidarParams, cast_rays: Callable[[Floats, Floats], Floats]) -> None:
         self._params = params
-        self._world = world
+        self._cast_rays = cast_rays
         self._directions = beam_directions(params)
 
     def cast(self, bodies: BodyState, robots: Sequence[int]) -> Floats:
@@ -69,7 +53,7 @@ class WorldCaster:
         directions = self._directions @ np.swapaxes(rotations, 1, 2)
         starts = origins[:, None] + near_m * directions
         ends = origins[:, None] + far_m * directions
-        fractions = self._world.cast(starts.reshape(-1, 3), ends.reshape(-1, 3))
+        fractions = self._cast_rays(starts.reshape(-1, 3), ends.reshape(-1, 3))
         return (near_m + fractions * (far_m - near_m)).reshape(starts.shape[:2])
 
 
@@ -137,13 +121,7 @@ class Lidars:
         self._noise = [np.random.default_rng([seed, 1, robot]) for robot in range(n_robots)]
 
     def scan(self, bodies: BodyState, robots: Sequence[int], now_s: float) -> List[Scan]:
-        """Return a scan of each of some robots.
-
-        Args:
-            bodies: State of all quadcopters.
-            robots: Numbers of the robots.
-            now_s: Present time, the stamp of the scans.
-        """
+        """Return a scan of each of some robots, with ``now_s`` as its stamp."""
         return [
             make_scan(self.params, now_s, row, self._noise[robot])
             for robot, row in zip(robots, self._caster.cast(bodies, robots))

@@ -162,11 +162,6 @@ class BodyState:
         """Velocities float64[n, 3] in ``map``."""
         return self.rows[:, 7:10]
 
-    @property
-    def angular_radps(self) -> Floats:
-        """Angular velocities float64[n, 3] in ``map``."""
-        return self.rows[:, 10:13]
-
     @cached_property
     def rotations(self) -> Floats:
         """Rotation matrices float64[n, 3, 3] with the bodies' axes in ``map`` as columns."""

@@ -82,7 +82,18 @@ class FreeFlight:
             steps = min(steps, _MOVING_STEPS)
             poses = moving_poses(steps)
         while done < steps:
-            more, found, other = self._fly(rows, commands, excluded, steps - done, poses[done:])
+            more, found, other = fly_freely(
+                rows,
+                commands,
+                excluded,
+                steps - done,
+                self._step_s,
+                self._scene.altitude_m,
+                self._law.constants,
+                self._law.gains,
+                self._space,
+                self._moving._replace(poses=poses[done:]),
+            )
             done += more
             if other == MOVING:
                 return BodyState(rows), done, [found]
@@ -91,23 +102,6 @@ class FreeFlight:
             if found != NO_INDEX and not self._is_far(found):
                 return BodyState(rows), done, [found]
         return BodyState(rows), done, []
-
-    def _fly(
-        self, rows: Floats, commands: Floats, excluded: NDArray[np.bool_], steps: int, poses: Floats
-    ) -> Tuple[int, int, int]:
-        moving = self._moving
-        return fly_freely(
-            rows,
-            commands,
-            excluded,
-            steps,
-            self._step_s,
-            self._scene.altitude_m,
-            self._law.constants,
-            self._law.gains,
-            self._space,
-            moving._replace(poses=poses) if len(moving.reaches_m) > 0 else moving,
-        )
 
     def _is_far(self, robot: int) -> bool:
         """Compute a robot's distance to the nearest surface; return whether it is far from it."""

@@ -6,7 +6,9 @@ import itertools
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Callable, Iterable, List, Optional, Sequence, Set, Tuple
+from typing import Any, Callable, List, Optional, Sequence, Set, Tuple
+
+import numpy as np
 
 from quad_nav.files.document import read_yaml
 from quad_nav.geometry import Pose2D
@@ -47,12 +49,11 @@ class ImportedScene:
     moving: Tuple[MovingObstacle, ...] = ()
 
 
-def from_world(path: Path, model_path: Sequence[Path]) -> ImportedScene:
-    """Import a Gazebo world; its extent is that of its obstacles.
+NOTHING = ImportedScene((), None, lambda x_m, y_m: True, ())
 
-    Args:
-        path: The world file.
-        model_path: Further folders with models.
+
+def from_world(path: Path, model_path: Sequence[Path]) -> ImportedScene:
+    """Import a Gazebo world; its extent is that of its obstacles, also of those that move.
 
     Raises:
         InputError: A file has faults; lists all of them.
@@ -62,21 +63,14 @@ def from_world(path: Path, model_path: Sequence[Path]) -> ImportedScene:
     obstacles, shapes = named[: len(world.obstacles)], named[len(world.obstacles) :]
     moving = [replace(one, shape=shape) for one, shape in zip(world.moving, shapes)]
     everywhere = (one.shape.placed(pose) for one in moving for pose in one.motion.poses)
-    corners = [
-        corner for solid in (*obstacles, *everywhere) for corner in solid.outline_m().tolist()
-    ]
+    outlines = [solid.outline_m() for solid in (*obstacles, *everywhere)]
     return ImportedScene(
-        tuple(obstacles), _extent(corners), lambda x_m, y_m: True, world.remarks, tuple(moving)
+        tuple(obstacles), _extent(outlines), lambda x_m, y_m: True, world.remarks, tuple(moving)
     )
 
 
 def from_map(path: Path, height_m: float, unknown_is_occupied: bool) -> ImportedScene:
-    """Import a map; its extent is that of its image.
-
-    Args:
-        path: The map's YAML file.
-        height_m: Height of the boxes that stand on occupied cells.
-        unknown_is_occupied: Put boxes on unknown cells too. Robots start on free cells only.
+    """Import a map; its extent is that of its image. Robots start on free cells only.
 
     Raises:
         InputError: A file has faults; lists all of them.
@@ -84,7 +78,7 @@ def from_map(path: Path, height_m: float, unknown_is_occupied: bool) -> Imported
     occupancy = load_map(read_yaml(path), path)
     boxes = occupancy.boxes(height_m, unknown_is_occupied)
     return ImportedScene(
-        tuple(boxes), _extent(occupancy.corners()), occupancy.is_free, occupancy.remarks
+        tuple(boxes), _extent([occupancy.corners()]), occupancy.is_free, occupancy.remarks
     )
 
 
@@ -102,12 +96,13 @@ def _with_unique_names(obstacles: Sequence[Obstacle]) -> List[Obstacle]:
     return named
 
 
-def _extent(corners: Iterable[Tuple[float, float]]) -> Optional[Extent]:
-    points = list(corners)
+def _extent(points: Sequence[Any]) -> Optional[Extent]:
+    """Return the extent of points, each array_like[k, 2]; None without any."""
     if not points:
         return None
-    xs, ys = [x for x, _ in points], [y for _, y in points]
-    return (min(xs), min(ys), max(xs), max(ys))
+    together = np.concatenate(points)
+    x_m, y_m = together.min(axis=0).tolist()
+    return (x_m, y_m, *together.max(axis=0).tolist())
 
 
 def with_free_starts(scene: Scene, may_start: Callable[[float, float], bool]) -> Scene:

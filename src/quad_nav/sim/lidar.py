@@ -89,12 +89,7 @@ def beam_directions(params: LidarParams) -> Floats:
 
 
 def lidar_poses(bodies: BodyState, robots: Sequence[int]) -> Tuple[Floats, Floats]:
-    """Return positions float64[n, 3] and rotation matrices float64[n, 3, 3] of LIDARs in ``map``.
-
-    Args:
-        bodies: State of all quadcopters.
-        robots: Numbers of the robots, n of them.
-    """
+    """Return positions float64[n, 3] and rotations float64[n, 3, 3] of LIDARs in ``map``."""
     rotations, positions_m = bodies.rotations, bodies.positions_m
     if list(robots) != list(range(len(positions_m))):
         rotations, positions_m = rotations[list(robots)], positions_m[list(robots)]
@@ -107,13 +102,7 @@ def make_scan(
     distances_m: Floats,
     random: Optional[np.random.Generator] = None,
 ) -> Scan:
-    """Make a scan of the distances at an instant.
-
-    Args:
-        params: Beam pattern and noise.
-        stamp_s: Time of the scan.
-        distances_m: float64[beams], +inf for no hit.
-        random: Source of the noise.
+    """Make a scan of distances float64[beams], +inf for no hit, with noise from ``random``.
 
     Raises:
         ValueError: There is noise but no source for it.

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.files.kernel_cache import njit
-from quad_nav.sim.rays import CYLINDER, Triple, dot, enter_solid, through_slab, triple, turn
-from quad_nav.sim.sectors import Axes, columns_of, rough_sectors, sector_of
+from quad_nav.sim.rays import Triple, enter_solid, through_slab, triple, turn
+from quad_nav.sim.sectors import Axes, columns_of, rough_sectors, sector_around
 
 _ROUNDING = 1e-6  # of a beam's number
 _RING_M, _RINGS = 1.0, 64  # rings around a LIDAR; the last one has no outer limit
@@ -142,21 +142,9 @@ def _cast_at_solids(
     """Shorten the beams, float64[m], to where they enter solids, near ones first.
 
     Most others are hidden behind the near ones, which a rough sector is enough to tell.
-
-    Args:
-        row: The beams' lengths.
-        origin: Position of the LIDAR.
-        rotation: float64[3, 3], axes of the LIDAR in ``map`` as columns.
-        beams: The beams.
-        solids: The solids.
-        columns: float64[8, s], ``sectors.columns_of`` them.
     """
     count = solids.kinds.shape[0]
-    axes = (
-        (rotation[0, 0], rotation[1, 0], rotation[2, 0]),
-        (rotation[0, 1], rotation[1, 1], rotation[2, 1]),
-        (rotation[0, 2], rotation[1, 2], rotation[2, 2]),
-    )
+    axes = triple(rotation[:, 0]), triple(rotation[:, 1]), triple(rotation[:, 2])
     rough = np.empty((3, count))
     rough_sectors(columns, origin, axes, rough)
     firsts, nexts = np.full(_RINGS, -1), np.empty(count, np.int64)  # lists of each ring's solids
@@ -165,90 +153,37 @@ def _cast_at_solids(
             ring = min(int(max(rough[0, solid], 0.0) / _RING_M), _RINGS - 1)
             nexts[solid] = firsts[ring]
             firsts[ring] = solid
-    solid = firsts[0]
-    while solid >= 0:
-        _cast_at_solid(row, origin, axes, beams, solids, solid)
-        solid = nexts[solid]
-    for ring in range(1, _RINGS):
+    for ring in range(_RINGS):
         solid = firsts[ring]
         while solid >= 0:
             limit = rough[0, solid] - _ROUNDING
-            first, last = _beams_of(rough[1, solid], rough[2, solid], beams)
-            first_beam = int(math.ceil(first))
-            begin, end = _trim(row, first_beam, int(math.floor(last)), limit)
-            if begin <= end:
-                _cast_at_visible(row, begin, end, origin, axes, beams, solids, solid)
-            last -= 2.0 * math.pi / beams.step_rad  # the rest after a full turn
-            if last >= 0.0:
-                begin, end = _trim(row, 0, min(int(math.floor(last)), first_beam - 1), limit)
-                if begin <= end:
-                    _cast_at_visible(row, begin, end, origin, axes, beams, solids, solid)
+            first_rad, width_rad = rough[1, solid], rough[2, solid]
+            if rough[0, solid] <= 0.0:
+                first_rad, width_rad = _sector_around(origin, axes, beams.near_m, solids, solid)
+            if width_rad >= 0.0:
+                first, last = _beams_of(first_rad, width_rad, beams)
+                first_beam = int(math.ceil(first))
+                end = int(math.floor(last))
+                _shorten(row, first_beam, end, limit, origin, axes, beams, solids, solid)
+                last -= 2.0 * math.pi / beams.step_rad  # the rest after a full turn
+                if last >= 0.0:
+                    end = min(int(math.floor(last)), first_beam - 1)
+                    _shorten(row, 0, end, limit, origin, axes, beams, solids, solid)
             solid = nexts[solid]
 
 
 @njit(cache=True, nogil=True)
-def _trim(row: NDArray[np.float64], first: int, last: int, limit: float) -> Tuple[int, int]:
-    """Leave out beams first .. last at both ends that are not longer than ``limit``."""
-    last = min(last, row.shape[0] - 1)
-    while first <= last and row[first] <= limit:
-        first += 1
-    while first <= last and row[last] <= limit:
-        last -= 1
-    return first, last
-
-
-@njit(cache=True, nogil=True)
-def _cast_at_visible(
-    row: NDArray[np.float64],
-    first: int,
-    last: int,
-    origin: Triple,
-    axes: Axes,
-    beams: Beams,
-    solids: Solids,
-    solid: int,
-) -> None:
-    """Shorten the beams first .. last to where they enter a solid that is not around the LIDAR."""
+def _sector_around(
+    origin: Triple, axes: Axes, near_m: float, solids: Solids, solid: int
+) -> Tuple[float, float]:
+    """Return ``sectors.sector_around`` a solid."""
     centre, to_solid = solids.centres[solid], solids.rotations[solid]
     offset = (origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2])
-    eye = turn(to_solid, offset)
-    ahead, left = turn(to_solid, axes[0]), turn(to_solid, axes[1])
-    kind, sizes = solids.kinds[solid], triple(solids.sizes[solid])
-    _shorten(row, first, last, kind, eye, ahead, left, sizes, beams)
-
-
-@njit(cache=True, nogil=True)
-def _cast_at_solid(
-    row: NDArray[np.float64],
-    origin: Triple,
-    axes: Axes,
-    beams: Beams,
-    solids: Solids,
-    solid: int,
-) -> None:
-    """Shorten the beams, float64[m], of a solid's sector to where they enter it."""
-    centre = solids.centres[solid]
-    sizes = triple(solids.sizes[solid])
-    offset = (origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2])
-    radius = math.sqrt(dot(sizes, sizes))  # of a ball around any kind
-    if abs(dot(axes[2], offset)) > radius or dot(offset, offset) > (beams.far_m + radius) ** 2:
-        return
-    kind, to_solid = solids.kinds[solid], solids.rotations[solid]
-    eye = turn(to_solid, offset)
-    if kind == CYLINDER and _surrounds(sizes, eye, beams.near_m):
-        return
     ahead, left, up = turn(to_solid, axes[0]), turn(to_solid, axes[1]), turn(to_solid, axes[2])
-    first_rad, width_rad = sector_of(kind, eye, ahead, left, up, sizes)
-    if width_rad < 0.0:
-        return
-    first, last = _beams_of(first_rad, width_rad, beams)
-    first_beam = int(math.ceil(first))
-    _shorten(row, first_beam, int(math.floor(last)), kind, eye, ahead, left, sizes, beams)
-    last -= 2.0 * math.pi / beams.step_rad  # the rest after a full turn
-    if last >= 0.0:
-        _shorten(
-            row, 0, min(int(math.floor(last)), first_beam - 1), kind, eye, ahead, left, sizes, beams
-        )
+    sizes = triple(solids.sizes[solid])
+    return sector_around(
+        solids.kinds[solid], turn(to_solid, offset), ahead, left, up, sizes, near_m
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -264,29 +199,31 @@ def _beams_of(first_rad: float, width_rad: float, beams: Beams) -> Tuple[float, 
 
 
 @njit(cache=True, nogil=True)
-def _surrounds(sizes: Triple, eye: Triple, near: float) -> bool:
-    """Tell whether a ball of radius ``near`` around the eye is well inside of a cylinder.
-
-    A quadcopter's own guard surrounds its LIDAR: no beam begins outside.
-    """
-    inscribed = min(sizes[0], sizes[1], sizes[2]) - near
-    return inscribed > 0.0 and dot(eye, eye) < inscribed * inscribed
-
-
-@njit(cache=True, nogil=True)
 def _shorten(
     row: NDArray[np.float64],
     first: int,
     last: int,
-    kind: int,
-    eye: Triple,
-    ahead: Triple,
-    left: Triple,
-    sizes: Triple,
+    limit: float,
+    origin: Triple,
+    axes: Axes,
     beams: Beams,
+    solids: Solids,
+    solid: int,
 ) -> None:
-    """Shorten the beams first .. last to where they enter the solid."""
-    for beam in range(first, min(last + 1, row.shape[0])):
+    """Shorten the beams first .. last to where they enter a solid that is beyond ``limit``."""
+    last = min(last, row.shape[0] - 1)
+    while first <= last and row[first] <= limit:
+        first += 1
+    while first <= last and row[last] <= limit:
+        last -= 1
+    if first > last:
+        return
+    centre, to_solid = solids.centres[solid], solids.rotations[solid]
+    offset = (origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2])
+    eye = turn(to_solid, offset)
+    ahead, left = turn(to_solid, axes[0]), turn(to_solid, axes[1])
+    kind, sizes = solids.kinds[solid], triple(solids.sizes[solid])
+    for beam in range(first, last + 1):
         cos, sin = beams.directions[beam, 0], beams.directions[beam, 1]
         direction = (
             cos * ahead[0] + sin * left[0],

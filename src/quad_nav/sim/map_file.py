@@ -80,11 +80,8 @@ class OccupancyMap:
 
     def occupied(self, unknown_too: bool) -> NDArray[np.bool_]:
         """Return the mask bool[H, W] of occupied cells, with unknown ones if asked."""
-        return (
-            (self.occupancy >= OCCUPIED) | (self.occupancy == UNKNOWN)
-            if unknown_too
-            else self.occupancy >= OCCUPIED
-        )
+        occupied: NDArray[np.bool_] = self.occupancy >= OCCUPIED
+        return occupied | (self.occupancy == UNKNOWN) if unknown_too else occupied
 
     def is_free(self, x_m: float, y_m: float) -> bool:
         """Return whether the cell at a point in ``map`` is known to be free."""
@@ -105,47 +102,27 @@ class OccupancyMap:
         return self.fields.origin.transform(column * resolution_m, row * resolution_m)
 
     def boxes(self, height_m: float, unknown_too: bool) -> List[Box]:
-        """Cover the occupied cells, and no other cells, with few disjoint boxes.
-
-        Args:
-            height_m: Height of the boxes.
-            unknown_too: Cover unknown cells too.
+        """Cover the occupied cells, unknown ones too if asked, with few disjoint boxes.
 
         Raises:
             InputError: There are more than ``MAX_BOXES`` boxes.
         """
         rectangles = rectangles_of(self.occupied(unknown_too)).tolist()
         if len(rectangles) > MAX_BOXES:
-            raise InputError(
-                [
-                    f"{self.fields.image}: occupied cells make {len(rectangles)} boxes, "
-                    f"expected {MAX_BOXES} at most (remove isolated pixels from the image)"
-                ]
-            )
+            problem = f"occupied cells make {len(rectangles)} boxes, expected {MAX_BOXES} at most"
+            advice = "remove isolated pixels from the image"
+            raise InputError([f"{self.fields.image}: {problem} ({advice})"])
         resolution_m, yaw_rad = self.fields.resolution_m, self.fields.origin.yaw_rad
         boxes = []
         for number, (column, row, width, height) in enumerate(rectangles):
-            x_m, y_m = self._in_map(column + width / 2, row + height / 2)
-            boxes.append(
-                Box(
-                    f"map_{number}",
-                    x_m,
-                    y_m,
-                    width * resolution_m,
-                    height * resolution_m,
-                    height_m,
-                    yaw_rad,
-                )
-            )
+            centre = self._in_map(column + width / 2, row + height / 2)
+            sizes = (width * resolution_m, height * resolution_m, height_m)
+            boxes.append(Box(f"map_{number}", *centre, *sizes, yaw_rad))
         return boxes
 
 
 def load_map(document: Any, path: Path) -> OccupancyMap:
-    """Check the document of a map's YAML file and read the image.
-
-    Args:
-        document: The parsed YAML.
-        path: The YAML file.
+    """Check the parsed document of a map's YAML file and read the image.
 
     Raises:
         InputError: The document or the image has faults; lists all of them.

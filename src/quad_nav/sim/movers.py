@@ -172,12 +172,9 @@ class Movers:
 
 
 def phases_s(motions: Sequence[Motion], common_s: Optional[float], seed: int) -> List[float]:
-    """Return the time by which each motion is ahead of the clock.
+    """Return the time by which each motion is ahead of the clock, at random by the seed.
 
-    Args:
-        motions: The motions.
-        common_s: Time by which all are ahead; None for a random part of the longest loop.
-        seed: Seed of random phases.
+    ``common_s`` is that by which all are ahead; None for a random part of the longest loop.
     """
     if common_s is None:
         longest_s = max((motion.length_s for motion in motions), default=0.0)

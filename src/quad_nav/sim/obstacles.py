@@ -22,6 +22,8 @@ Triple = Tuple[float, float, float]
 
 ROUND_CORNERS = 32
 """Corners of the outline of a round obstacle."""
+_OPTIONAL = ("yaw", "bottom")
+"""Keys of scene files that are 0 by default, and may be below."""
 
 
 class Obstacle(ABC):
@@ -29,7 +31,7 @@ class Obstacle(ABC):
 
     Attributes:
         shape: Name of the shape in scene files.
-        keys: Keys of a scene file that the shape has beside name, shape, centre and motion.
+        keys: The fields of each key in scene files, beside name, shape, centre and motion.
         name: Unique in a scene.
         bottom_m: Height of the lowest point above the floor.
         height_m: Distance from the lowest to the highest point.
@@ -37,7 +39,7 @@ class Obstacle(ABC):
     """
 
     shape: ClassVar[str]
-    keys: ClassVar[Sequence[str]]
+    keys: ClassVar[Mapping[str, Sequence[str]]]
     name: str
     x_m: float
     y_m: float
@@ -46,15 +48,32 @@ class Obstacle(ABC):
     yaw_rad: float = 0.0
 
     @classmethod
-    @abstractmethod
     def read(
         cls, check: Checker, entry: Dict[str, Any], place: str, name: str, x_m: float, y_m: float
     ) -> Obstacle:
         """Read the shape's own keys of an obstacle in a scene file; ``check`` gets the faults."""
+        given: Dict[str, float] = {}
+        for key, names in cls.keys.items():
+            if len(names) > 1:
+                given.update(
+                    zip(names, check.numbers(entry, key, place, len(names), positive=True))
+                )
+            elif key in _OPTIONAL:
+                given[names[0]] = check.number(entry, key, place, 0.0)
+            else:
+                given[names[0]] = check.number(entry, key, place, positive=True)
+        return cls._of(check, place, name, x_m, y_m, given)
 
-    @abstractmethod
-    def values(self) -> Dict[str, Any]:
-        """Return the values of the shape's own keys, without ``bottom``."""
+    @classmethod
+    def _of(
+        cls, check: Checker, place: str, name: str, x_m: float, y_m: float, given: Dict[str, float]
+    ) -> Obstacle:
+        """Return an obstacle that stands or hangs."""
+        if given["bottom_m"] < 0.0:
+            problem = f"{given['bottom_m']:g} m is below the floor, expected 0 or more"
+            check.fault(f"{place}.bottom", problem)
+        made: Obstacle = cast(Any, cls)(name, x_m, y_m, **given)
+        return made
 
     @property
     @abstractmethod
@@ -130,13 +149,12 @@ class Obstacle(ABC):
 
     def document(self) -> Dict[str, Any]:
         """Return the entry of a scene file that ``read`` makes an equal obstacle of."""
-        return {
-            "name": self.name,
-            "centre": [self.x_m, self.y_m],
-            "shape": self.shape,
-            **self.values(),
-            **({"bottom": self.bottom_m} if self.bottom_m else {}),
-        }
+        entry = {"name": self.name, "centre": [self.x_m, self.y_m], "shape": self.shape}
+        for key, names in self.keys.items():
+            values = [getattr(self, name) for name in names]
+            if key != "bottom" or self.bottom_m:
+                entry[key] = values if len(values) > 1 else values[0]
+        return entry
 
 
 @dataclass(frozen=True)
@@ -144,7 +162,12 @@ class Box(Obstacle):
     """Upright box with its centre at (x, y), rotated by ``yaw_rad`` about its vertical axis."""
 
     shape = "box"
-    keys = ("size", "height", "yaw", "bottom")
+    keys = {
+        "size": ("size_x_m", "size_y_m"),
+        "yaw": ("yaw_rad",),
+        "height": ("height_m",),
+        "bottom": ("bottom_m",),
+    }
 
     name: str
     x_m: float
@@ -154,21 +177,6 @@ class Box(Obstacle):
     height_m: float
     yaw_rad: float = 0.0
     bottom_m: float = 0.0
-
-    @classmethod
-    def read(
-        cls, check: Checker, entry: Dict[str, Any], place: str, name: str, x_m: float, y_m: float
-    ) -> Box:
-        """Read the shape's own keys; see ``Obstacle.read``."""
-        size_x_m, size_y_m = check.numbers(entry, "size", place, 2, positive=True)
-        height_m, bottom_m = _read_upright(check, entry, place)
-        yaw_rad = check.number(entry, "yaw", place, 0.0)
-        return cls(name, x_m, y_m, size_x_m, size_y_m, height_m, yaw_rad, bottom_m)
-
-    def values(self) -> Dict[str, Any]:
-        """Return the values of the shape's own keys, without ``bottom``."""
-        size = [self.size_x_m, self.size_y_m]
-        return {"size": size, "yaw": self.yaw_rad, "height": self.height_m}
 
     @property
     def half_m(self) -> Triple:
@@ -219,6 +227,11 @@ class _Round(Obstacle):
     radius_m: float
 
     @property
+    def half_m(self) -> Triple:
+        """Half of the extent along the obstacle's own x, y and z."""
+        return (self.radius_m, self.radius_m, self.height_m / 2)
+
+    @property
     def reach_m(self) -> float:
         """Radius of an upright cylinder around the centre that holds the obstacle."""
         return self.radius_m
@@ -234,7 +247,7 @@ class Cylinder(_Round):
     """Upright cylinder with its axis at (x, y)."""
 
     shape = "cylinder"
-    keys = ("radius", "height", "bottom")
+    keys = {"radius": ("radius_m",), "height": ("height_m",), "bottom": ("bottom_m",)}
 
     name: str
     x_m: float
@@ -242,23 +255,6 @@ class Cylinder(_Round):
     radius_m: float
     height_m: float
     bottom_m: float = 0.0
-
-    @classmethod
-    def read(
-        cls, check: Checker, entry: Dict[str, Any], place: str, name: str, x_m: float, y_m: float
-    ) -> Cylinder:
-        """Read the shape's own keys; see ``Obstacle.read``."""
-        radius_m = check.number(entry, "radius", place, positive=True)
-        return cls(name, x_m, y_m, radius_m, *_read_upright(check, entry, place))
-
-    def values(self) -> Dict[str, Any]:
-        """Return the values of the shape's own keys, without ``bottom``."""
-        return {"radius": self.radius_m, "height": self.height_m}
-
-    @property
-    def half_m(self) -> Triple:
-        """Half of the extent along the obstacle's own x, y and z."""
-        return (self.radius_m, self.radius_m, self.height_m / 2)
 
     def surface_distance_m(self, x_m: Coordinate, y_m: Coordinate, z_m: float) -> Any:
         """Return the distance to the surface; see ``Obstacle.surface_distance_m``."""
@@ -289,7 +285,7 @@ class Sphere(_Round):
     """Sphere with its centre at (x, y, z)."""
 
     shape = "sphere"
-    keys = ("radius", "bottom")
+    keys = {"radius": ("radius_m",), "bottom": ("bottom_m",)}
 
     name: str
     x_m: float
@@ -304,25 +300,15 @@ class Sphere(_Round):
         object.__setattr__(self, "height_m", 2.0 * self.radius_m)
 
     @classmethod
-    def read(
-        cls, check: Checker, entry: Dict[str, Any], place: str, name: str, x_m: float, y_m: float
+    def _of(
+        cls, check: Checker, place: str, name: str, x_m: float, y_m: float, given: Dict[str, float]
     ) -> Sphere:
-        """Read the shape's own keys; see ``Obstacle.read``."""
-        radius_m = check.number(entry, "radius", place, positive=True)
-        bottom_m = check.number(entry, "bottom", place, 0.0)
+        """Return a sphere of which a part is above the floor."""
+        radius_m, bottom_m = given["radius_m"], given["bottom_m"]
         if bottom_m + 2 * radius_m <= 0.0:
             problem = f"{bottom_m:g} m puts the obstacle below the floor, expected a higher one"
             check.fault(f"{place}.bottom", problem)
         return cls(name, x_m, y_m, bottom_m + radius_m, radius_m)
-
-    def values(self) -> Dict[str, Any]:
-        """Return the values of the shape's own keys, without ``bottom``."""
-        return {"radius": self.radius_m}
-
-    @property
-    def half_m(self) -> Triple:
-        """Half of the extent along the obstacle's own x, y and z."""
-        return (self.radius_m, self.radius_m, self.radius_m)
 
     def surface_distance_m(self, x_m: Coordinate, y_m: Coordinate, z_m: float) -> Any:
         """Return the distance to the surface; see ``Obstacle.surface_distance_m``."""
@@ -331,15 +317,6 @@ class Sphere(_Round):
 
 
 SHAPES: Mapping[str, Type[Obstacle]] = {one.shape: one for one in (Box, Cylinder, Sphere)}
-
-
-def _read_upright(check: Checker, entry: Dict[str, Any], place: str) -> Tuple[float, float]:
-    """Return height and bottom of an obstacle in a scene file that stands or hangs."""
-    height_m = check.number(entry, "height", place, positive=True)
-    bottom_m = check.number(entry, "bottom", place, 0.0)
-    if bottom_m < 0.0:
-        check.fault(f"{place}.bottom", f"{bottom_m:g} m is below the floor, expected 0 or more")
-    return height_m, bottom_m
 
 
 def _outside_slab(z_m: float, bottom_m: float, height_m: float) -> float:

@@ -16,9 +16,9 @@ def cover(
 ) -> Tuple[int, int]:
     """Cover marked cells with disjoint rectangles that hold no other cells.
 
-    Greedy: from the first cell in row order that is not covered yet, a rectangle
-    is grown as wide as it goes and then as high as it goes, and another one the
-    other way round; the larger one is kept.
+    Greedy: from the first cell in row order that is not covered yet, a rectangle is grown as wide
+    as it goes and then as high as it goes, and another one the other way round; the larger one is
+    kept.
 
     Args:
         left: bool[H, W], the cells to cover, none before ``first_row``;
@@ -37,8 +37,8 @@ def cover(
                 continue
             if count == rectangles.shape[0]:
                 return count, row
-            w, h = _widest(left, row, column)
-            other_w, other_h = _highest(left, row, column)
+            w, h = _grow(left, row, column)
+            other_h, other_w = _grow(left.T, column, row)
             if other_w * other_h > w * h:
                 w, h = other_w, other_h
             for y in range(row, row + h):
@@ -51,36 +51,22 @@ def cover(
 
 
 @njit(cache=True, nogil=True)
-def _widest(left: NDArray[np.bool_], row: int, column: int) -> Tuple[int, int]:
+def _grow(left: NDArray[np.bool_], row: int, column: int) -> Tuple[int, int]:
     """Return width and height of the rectangle that grows along the row first."""
     height, width = left.shape
     end = column + 1
     while end < width and left[row, end]:
         end += 1
     below = row + 1
-    while below < height and _all(left, below, below + 1, column, end):
+    while below < height and _all(left, below, column, end):
         below += 1
     return end - column, below - row
 
 
 @njit(cache=True, nogil=True)
-def _highest(left: NDArray[np.bool_], row: int, column: int) -> Tuple[int, int]:
-    """Return width and height of the rectangle that grows along the column first."""
-    height, width = left.shape
-    below = row + 1
-    while below < height and left[below, column]:
-        below += 1
-    end = column + 1
-    while end < width and _all(left, row, below, end, end + 1):
-        end += 1
-    return end - column, below - row
-
-
-@njit(cache=True, nogil=True)
-def _all(left: NDArray[np.bool_], row: int, end_row: int, column: int, end_column: int) -> bool:
-    """Tell whether every cell of a rectangle is still to be covered."""
-    for y in range(row, end_row):
-        for x in range(column, end_column):
-            if not left[y, x]:
-                return False
+def _all(left: NDArray[np.bool_], row: int, column: int, end: int) -> bool:
+    """Tell whether every cell of a part of a row is still to be covered."""
+    for x in range(column, end):
+        if not left[row, x]:
+            return False
     return True

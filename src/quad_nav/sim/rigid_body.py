@@ -28,9 +28,7 @@ class FreeSpace(NamedTuple):
 
     mount_m: float  # height of a hull's centre above the body's origin, along the body's z axis
     pair_m: float  # two quadcopters with centres nearer than this may touch
-    checked_m: NDArray[
-        np.float64
-    ]  # [n, 3], points whose distance to the nearest surface was computed
+    checked_m: NDArray[np.float64]  # [n, 3], where the distance to the nearest surface was computed
     free_m: NDArray[np.float64]  # [n], how far a centre may be from its checked point
     centres_m: NDArray[np.float64]  # [n, 3], the hulls' centres, filled by ``find_near``
 
@@ -203,12 +201,6 @@ def find_near_moving(
     excluded: NDArray[np.bool_], space: FreeSpace, moving: MovingSolids, step: int
 ) -> int:
     """Find a quadcopter that is not excluded and that may touch a solid that moves by itself.
-
-    Args:
-        excluded: bool[n], bodies that something else moves.
-        space: Its ``centres_m`` are those of the quadcopters' hulls.
-        moving: The solids.
-        step: Number of the next step.
 
     Returns:
         Its number, or ``NO_INDEX``.

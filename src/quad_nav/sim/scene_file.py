@@ -30,13 +30,19 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Sequence, Union
+from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 from quad_nav.errors import InputError
 from quad_nav.files.document import Checker, describe, read_yaml
 from quad_nav.files.user_files import referenced_file
 from quad_nav.geometry import Pose2D
-from quad_nav.sim.imported_scene import ImportedScene, from_map, from_world, with_free_starts
+from quad_nav.sim.imported_scene import (
+    NOTHING,
+    ImportedScene,
+    from_map,
+    from_world,
+    with_free_starts,
+)
 from quad_nav.sim.motion_file import (
     MOTION_KEYS,
     check_motions,
@@ -113,25 +119,26 @@ def _read_scene(check: Checker, document: Any, default_name: str, folder: Path) 
     altitude = check.number(fields, "altitude", "", 1.0, positive=True)
     walls = _read_walls(check, fields)
     imported = _read_import(check, fields, folder, walls.height_m)
-    arena = _read_arena(check, fields, imported)
+    origin, size = _read_arena(check, fields, imported)
     arena_is_sound = len(check.problems) == faults_before
     entries = enumerate(check.sequence(fields, "obstacles", []))
     obstacles = [_read_obstacle(check, entry, k) for k, entry in entries]
     moving = [one for one in obstacles if isinstance(one, MovingObstacle)]
     standing = [one for one in obstacles if one and not isinstance(one, MovingObstacle)]
     starts = _read_starts(check, fields, imported)
+    content = imported or NOTHING
     scene = Scene(
         check.text(fields, "name", "", default_name),
-        arena[2],
-        arena[3],
+        size[0],
+        size[1],
         altitude,
         walls,
-        (*(imported.obstacles if imported else ()), *standing),
+        (*content.obstacles, *standing),
         tuple(s for s in starts if s is not None),
-        arena[0],
-        arena[1],
-        imported.remarks if imported else (),
-        (*(imported.moving if imported else ()), *moving),
+        origin[0],
+        origin[1],
+        content.remarks,
+        (*content.moving, *moving),
         read_phase(check, fields, "motion_phase", ""),
         read_walkers(check, fields),
     )
@@ -166,15 +173,11 @@ def _read_import(
         return None
     try:
         if "world" in fields:
-            return from_world(
-                referenced_file(folder, check.text(fields, "world", "", ".")), model_path()
-            )
+            path = referenced_file(folder, check.text(fields, "world", "", "."))
+            return from_world(path, model_path())
         if "map" in fields:
-            return from_map(
-                referenced_file(folder, check.text(fields, "map", "", ".")),
-                height_m,
-                unknown == "occupied",
-            )
+            path = referenced_file(folder, check.text(fields, "map", "", "."))
+            return from_map(path, height_m, unknown == "occupied")
     except InputError as error:
         check.problems += error.problems
     return None
@@ -188,28 +191,25 @@ def model_path() -> List[Path]:
 
 def _read_arena(
     check: Checker, fields: Dict[str, Any], imported: Optional[ImportedScene]
-) -> Sequence[float]:
+) -> Tuple[Sequence[float], Sequence[float]]:
     """Return x and y of the lower left corner, and the sizes along x and y."""
     is_imported = "world" in fields or "map" in fields
+    unknown = (0.0, 0.0), (1.0, 1.0)
     if is_imported and "size" not in fields and "origin" not in fields:
         if imported is None:
-            return (0.0, 0.0, 1.0, 1.0)
+            return unknown
         if imported.extent is None:
-            check.fault(
-                "size",
-                "missing, and the world has no obstacles that give the arena its size; "
-                "expected a scene with world, size and origin",
-            )
-            return (0.0, 0.0, 1.0, 1.0)
+            problem = "missing, and the world has no obstacles that give the arena its size"
+            check.fault("size", f"{problem}; expected a scene with world, size and origin")
+            return unknown
         x, y, end_x, end_y = imported.extent
-        return (x, y, end_x - x, end_y - y)
+        return (x, y), (end_x - x, end_y - y)
     size = check.numbers(fields, "size", "", 2, positive=True)
     if max(size) > MAX_SIZE_M:
         check.fault("size", f"{max(size):g} m, expected {MAX_SIZE_M:g} m at most")
-    origin = (
-        check.numbers(fields, "origin", "", 2) if "origin" in fields or is_imported else (0.0, 0.0)
-    )
-    return (*origin, *size)
+    if "origin" in fields or is_imported:
+        return check.numbers(fields, "origin", "", 2), size
+    return (0.0, 0.0), size
 
 
 def _read_obstacle(
@@ -302,11 +302,9 @@ def _check_starts(check: Checker, scene: Scene, starts: Sequence[Optional[Pose2D
         for other_k, other in readable[: readable.index((k, start))]:
             distance_m = start.distance_to(other)
             if distance_m <= 2 * BODY_RADIUS_M:
-                check.fault(
-                    f"starts[{k}]",
-                    f"is {distance_m:.2f} m from starts[{other_k}], "
-                    f"expected more than two body radii, {2 * BODY_RADIUS_M:g} m",
-                )
+                expected = f"expected more than two body radii, {2 * BODY_RADIUS_M:g} m"
+                problem = f"is {distance_m:.2f} m from starts[{other_k}], {expected}"
+                check.fault(f"starts[{k}]", problem)
 
 
 def outside_problem(scene: Scene, start: Pose2D) -> str:

@@ -1,12 +1,8 @@
 """Sectors: the bearings of a planar LIDAR at which a solid can be seen.
 
-All beams lie in the LIDAR's plane, so a solid is seen between the bearings that bound its
-shadow on that plane. A sector is (first bearing, width), counter-clockwise, radians in the
-LIDAR's frame; a negative width is an empty one, 2 pi is all around. Sectors may be too wide
-but never too narrow.
-
-A view of a solid is given in the solid's own frame: ``eye``, the LIDAR's position in metres, and
-its axes ``ahead``, ``left`` and ``up``, as triples. Kinds and sizes as in ``rays``.
+A sector is (first bearing, width), counter-clockwise, radians in the LIDAR's frame; a negative
+width is an empty one, 2 pi is all around. Sectors may be too wide but never too narrow. Kinds and
+sizes of solids as in ``rays``.
 """
 
 from __future__ import annotations
@@ -29,35 +25,35 @@ _ROUGH_RAD = 0.005  # more than the error of a rough bearing
 
 
 @njit(cache=True, nogil=True)
-def sector_of(
-    kind: int, eye: Triple, ahead: Triple, left: Triple, up: Triple, sizes: Triple
+def sector_around(
+    kind: int,
+    eye: Triple,
+    ahead: Triple,
+    left: Triple,
+    up: Triple,
+    sizes: Triple,
+    near_m: float,
 ) -> Tuple[float, float]:
-    """Return the sector of a solid; that of its bounding box unless it is round."""
-    height = abs(dot(up, eye))
-    if kind == CYLINDER:
-        if height > abs(up[2]) * sizes[2] + math.sqrt(up[0] * up[0] + up[1] * up[1]) * sizes[0]:
-            return EMPTY
-        return _cylinder_sector(eye, ahead, left, up, sizes)
-    if kind == SPHERE:
-        if height > sizes[0]:
-            return EMPTY
-        return _disc_sector(
-            -dot(ahead, eye), -dot(left, eye), math.sqrt(sizes[0] * sizes[0] - height * height)
-        )
-    if height > abs(up[0]) * sizes[0] + abs(up[1]) * sizes[1] + abs(up[2]) * sizes[2]:
-        return EMPTY
-    return _box_sector(eye, ahead, left, up, sizes)
+    """Return the sector of the box around a solid that is near to the LIDAR or around it.
 
+    All beams lie in the LIDAR's plane, so a box is seen between the bearings that bound its shadow
+    on that plane. The shadow is convex: if the eye is outside it, all corners lie within half a
+    turn and "further left" is the sign of a cross product.
 
-@njit(cache=True, nogil=True)
-def _box_sector(
-    eye: Triple, ahead: Triple, left: Triple, up: Triple, sizes: Triple
-) -> Tuple[float, float]:
-    """Return the sector between the outermost corners, unless the eye is above or below the box.
-
-    The shadow on the plane is convex: if the eye is outside it, all corners lie within
-    half a turn and "further left" is the sign of a cross product.
+    Args:
+        kind: Kind of the solid.
+        eye: The LIDAR's position in the solid's own frame.
+        ahead: Its x axis there.
+        left: Its y axis there.
+        up: Its z axis there.
+        sizes: Sizes of the solid.
+        near_m: Distance at which beams begin.
     """
+    if abs(dot(up, eye)) > abs(up[0]) * sizes[0] + abs(up[1]) * sizes[1] + abs(up[2]) * sizes[2]:
+        return EMPTY
+    inscribed = min(sizes[0], sizes[1], sizes[2]) - near_m
+    if kind == CYLINDER and inscribed > 0.0 and dot(eye, eye) < inscribed * inscribed:
+        return EMPTY  # a quadcopter's own guard: no beam begins outside
     if enter_box(eye, up, sizes) < math.inf:
         return FULL
     middle_x, middle_y = -dot(ahead, eye), -dot(left, eye)
@@ -76,33 +72,6 @@ def _box_sector(
     first = math.atan2(right_y, right_x)
     width = math.atan2(left_y, left_x) - first
     return first, width if width >= 0.0 else width + 2.0 * math.pi
-
-
-@njit(cache=True, nogil=True)
-def _cylinder_sector(
-    eye: Triple, ahead: Triple, left: Triple, up: Triple, sizes: Triple
-) -> Tuple[float, float]:
-    """Return the sector of a cylinder.
-
-    The plane cuts a standing cylinder in an ellipse around its axis, with the long half
-    radius / cos(tilt). A lying one is replaced by its bounding sphere.
-    """
-    if abs(up[2]) > _STANDING:
-        z = dot(up, eye) / up[2]  # where the axis meets the plane
-        return _disc_sector(
-            ahead[2] * z - dot(ahead, eye), left[2] * z - dot(left, eye), sizes[0] / abs(up[2])
-        )
-    return _disc_sector(-dot(ahead, eye), -dot(left, eye), math.hypot(sizes[0], sizes[2]))
-
-
-@njit(cache=True, nogil=True)
-def _disc_sector(x: float, y: float, radius: float) -> Tuple[float, float]:
-    """Return the sector of a disc around (x, y) seen from (0, 0)."""
-    distance = math.sqrt(x * x + y * y)
-    if distance <= radius:
-        return FULL
-    half = math.asin(radius / distance)
-    return math.atan2(y, x) - half, 2.0 * half
 
 
 @njit(cache=True, nogil=True)
@@ -147,7 +116,7 @@ def rough_sectors(
         origin: Position of the LIDAR in ``map``, metres.
         axes: Axes of the LIDAR.
         rough: float64[3, s], filled with the distance to the disc, negative inside of it, and the
-            sector's first bearing and width; that of a near disc may be too narrow.
+            sector's first bearing and width, which count outside of the disc alone.
     """
     ahead, left, up = axes
     for k in range(columns.shape[1]):

@@ -95,7 +95,7 @@ class Simulation:
         params = self.params
         if params.lidar_caster == "kernel":
             return KernelCaster(params.lidar, self.scene, self.n_robots, params.airframe.radius_m)
-        return WorldCaster(params.lidar, self._world)
+        return WorldCaster(params.lidar, self._world.cast)
 
     @property
     def n_robots(self) -> int:

@@ -18,29 +18,16 @@ _START_TRIES = 1000
 def start_poses(
     scene: Scene, n_robots: int, jitter_m: float, seed: int, body_radius_m: float = BODY_RADIUS_M
 ) -> List[Pose2D]:
-    """Displace the start poses of a scene at random.
+    """Displace the first start poses of a scene at random, each in a disc of ``jitter_m``.
 
     Each keeps clear of obstacles, walls and the starts before it.
-
-    Args:
-        scene: The scene.
-        n_robots: Number of start poses to use.
-        jitter_m: Radius of the disc around a start that it is displaced in.
-        seed: Seed of the displacements.
-        body_radius_m: Radius of the quadcopters' guards.
 
     Raises:
         InputError: The scene has too few starts, or a start has no free position around it.
     """
     if not 1 <= n_robots <= len(scene.starts):
-        raise InputError(
-            [
-                (
-                    f"robots: {n_robots}, expected 1 to {len(scene.starts)}, "
-                    f"the start poses of scene {scene.name}"
-                )
-            ]
-        )
+        known = f"1 to {len(scene.starts)}, the start poses of scene {scene.name}"
+        raise InputError([f"robots: {n_robots}, expected {known}"])
     random = np.random.default_rng([seed, 0])
     starts: List[Pose2D] = []
     for robot in range(n_robots):
@@ -62,10 +49,8 @@ def _displaced(
     for _ in range(_START_TRIES):
         radius_m = jitter_m * math.sqrt(random.random())
         angle_rad = 2.0 * math.pi * random.random()
-        x_m, y_m = (
-            start.x_m + radius_m * math.cos(angle_rad),
-            start.y_m + radius_m * math.sin(angle_rad),
-        )
+        x_m = start.x_m + radius_m * math.cos(angle_rad)
+        y_m = start.y_m + radius_m * math.sin(angle_rad)
         pose = Pose2D(x_m, y_m, start.yaw_rad)
         if (
             scene.contains(x_m, y_m)
@@ -73,11 +58,6 @@ def _displaced(
             and all(pose.distance_to(o) > 2 * body_radius_m + _START_GAP_M for o in others)
         ):
             return pose
-    raise InputError(
-        [
-            (
-                f"jitter: {jitter_m:g} m leaves no free start for quad{robot} around "
-                f"({start.x_m:g}, {start.y_m:g}), expected a smaller jitter"
-            )
-        ]
-    )
+    around = f"quad{robot} around ({start.x_m:g}, {start.y_m:g})"
+    problem = f"jitter: {jitter_m:g} m leaves no free start for {around}, expected a smaller jitter"
+    raise InputError([problem])

@@ -102,10 +102,7 @@ class Crowd:
     def react(self, time_s: float, others: Floats, radius_m: float) -> None:
         """Walk up to the end of the present period, unless that is known.
 
-        Args:
-            time_s: Present time.
-            others: float64[o, 4], position and velocity of each quadcopter in ``map``.
-            radius_m: Radius of the quadcopters.
+        ``others`` is float64[o, 4], position and velocity of each quadcopter in ``map``.
         """
         if round_down(time_s) < self._last:
             return
@@ -178,12 +175,9 @@ def people_of(
             ):
                 break
         else:
-            raise InputError(
-                [
-                    f"scene {scene.name}: walkers: no room for person {number} of "
-                    f"{walkers.count}, {START_M:g} m from all start poses; expected fewer"
-                ]
-            )
+            place_m = f"{START_M:g} m from all start poses; expected fewer"
+            problem = f"no room for person {number} of {walkers.count}, {place_m}"
+            raise InputError([f"scene {scene.name}: walkers: {problem}"])
         starts.append(place)
     count = walkers.count
     return People(

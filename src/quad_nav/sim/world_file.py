@@ -1,7 +1,7 @@
 """Gazebo worlds as obstacles: ``.world`` and ``.sdf`` files, and the models that they include.
 
 Boxes, cylinders and spheres of the models' collisions become obstacles. A plane at z = 0 is the
-floor. Actors with waypoints become moving obstacles, see ``sdf_actors``. A remark names every other
+floor. Actors with waypoints become moving obstacles, see ``sdf``. A remark names every other
 solid that is left out, with the reason. Poses are composed along world, nested models, link and
 collision. As in Gazebo, a saved ``<state>`` overrides the poses of models and links.
 """
@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import os
 import re
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import Dict, List, Optional, Sequence, Tuple
+from typing import Dict, Iterator, List, Optional, Sequence, Tuple
 
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import referenced_file
@@ -20,9 +21,14 @@ from quad_nav.files.xml_tree import Element, read_xml
 from quad_nav.geometry import Pose3D
 from quad_nav.sim.obstacles import Obstacle
 from quad_nav.sim.scene import MovingObstacle
-from quad_nav.sim.sdf_actors import actor_of
-from quad_nav.sim.sdf_shapes import obstacle_of
-from quad_nav.sim.sdf_values import IDENTITY, NotRepresented, SdfReader, is_true
+from quad_nav.sim.sdf import (
+    IDENTITY,
+    NotRepresented,
+    SdfReader,
+    actor_of,
+    is_true,
+    obstacle_of,
+)
 
 MAX_OBSTACLES = 100_000
 MAX_INCLUDES = 16
@@ -69,28 +75,25 @@ class _Findings:
             self.files[path] = read_xml(path)
             self.bytes_read += path.stat().st_size
             if self.bytes_read > MAX_BYTES:
-                raise InputError(
-                    [
-                        f"{path}: brings the included files to {self.bytes_read} bytes, "
-                        f"expected {MAX_BYTES} at most"
-                    ]
-                )
+                problem = f"brings the included files to {self.bytes_read} bytes"
+                raise InputError([f"{path}: {problem}, expected {MAX_BYTES} at most"])
         return self.files[path]
 
-    def count_part(self, path: Path) -> None:
-        """Count a model, link or collision.
+    @contextmanager
+    def part(self, name: str, path: Path) -> Iterator[None]:
+        """Read a model, link or collision, which is left out if no obstacle represents it.
 
         Raises:
             InputError: There are more than ``MAX_PARTS``.
         """
         self.parts += 1
         if self.parts > MAX_PARTS:
-            raise InputError(
-                [
-                    f"{path}: more than {MAX_PARTS} models, links and collisions, "
-                    "included ones counted"
-                ]
-            )
+            what = "models, links and collisions, included ones counted"
+            raise InputError([f"{path}: more than {MAX_PARTS} {what}"])
+        try:
+            yield
+        except NotRepresented as reason:
+            self.leave_out(name, str(reason))
 
     def leave_out(self, name: str, reason: str) -> None:
         self.left_out.setdefault(reason, []).append(name)
@@ -127,21 +130,11 @@ def load_world(path: Path, model_path: Sequence[Path] = ()) -> GazeboWorld:
         )
     if findings.problems:
         raise InputError(findings.problems)
-    return GazeboWorld(
-        tuple(findings.obstacles), tuple(_remarks(path, findings)), tuple(findings.moving)
-    )
-
-
-def _remarks(path: Path, findings: _Findings) -> List[str]:
-    remarks = [
-        f"{path}: left out, {reason}: {', '.join(names)}"
-        for reason, names in findings.left_out.items()
-    ]
+    found = {f"left out, {reason}": names for reason, names in findings.left_out.items()}
     if findings.not_static:
-        remarks.append(
-            f"{path}: not static in Gazebo, but fixed here: {', '.join(findings.not_static)}"
-        )
-    return remarks
+        found["not static in Gazebo, but fixed here"] = findings.not_static
+    remarks = tuple(f"{path}: {what}: {', '.join(names)}" for what, names in found.items())
+    return GazeboWorld(tuple(findings.obstacles), remarks, tuple(findings.moving))
 
 
 @dataclass(frozen=True)
@@ -160,29 +153,19 @@ class _Walk:
         for child in parent.children:
             if child.tag not in ("model", "include"):
                 continue
-            name = prefix + _name_of(child)
-            self.findings.count_part(self.reader.path)
-            try:
-                if child.tag == "include":
-                    self._include(child, map_from_parent, prefix, state)
-                else:
-                    self._model(child, map_from_parent, prefix, state)
-            except NotRepresented as reason:
-                self.findings.leave_out(name, str(reason))
+            with self.findings.part(prefix + _name_of(child), self.reader.path):
+                read = self._include if child.tag == "include" else self._model
+                read(child, map_from_parent, prefix, state)
 
     def actor(self, actor: Element) -> None:
         """Read an actor of the world."""
         name = _name_of(actor)
-        self.findings.count_part(self.reader.path)
-        try:
+        with self.findings.part(name, self.reader.path):
             person = actor_of(self.reader, actor, name)
-        except NotRepresented as reason:
-            self.findings.leave_out(name, str(reason))
-            return
-        if isinstance(person, MovingObstacle):
-            self.findings.moving.append(person)
-        elif person is not None:
-            self.findings.obstacles.append(person)
+            if isinstance(person, MovingObstacle):
+                self.findings.moving.append(person)
+            elif person is not None:
+                self.findings.obstacles.append(person)
 
     def _model(
         self,
@@ -236,33 +219,25 @@ class _Walk:
         self, link: Element, map_from_model: Pose3D, prefix: str, state: Optional[Element]
     ) -> None:
         name = prefix + _name_of(link)
-        self.findings.count_part(self.reader.path)
         collisions = list(link.all("collision"))
         if not collisions and link.first("visual") is not None:
             self.findings.leave_out(name, "looks without a collision")
-        try:
+        with self.findings.part(name, self.reader.path):
             map_from_link = map_from_model.compose(self.reader.pose(link))
             saved = _state_of(state, "link", _name_of(link))
             if saved is not None:
                 map_from_link = self.reader.pose(saved, map_from_link)
-        except NotRepresented as reason:
-            self.findings.leave_out(name, str(reason))
-            return
-        for collision in collisions:
-            self._collision(collision, map_from_link, f"{name}/")
+            for collision in collisions:
+                self._collision(collision, map_from_link, f"{name}/")
 
     def _collision(self, collision: Element, map_from_link: Pose3D, prefix: str) -> None:
         name = prefix + _name_of(collision)
-        self.findings.count_part(self.reader.path)
-        try:
+        with self.findings.part(name, self.reader.path):
             map_from_shape = map_from_link.compose(self.reader.pose(collision))
             geometry = collision.first("geometry") or Element("geometry", {}, collision.line)
             obstacle = obstacle_of(self.reader, geometry, name, map_from_shape)
-        except NotRepresented as reason:
-            self.findings.leave_out(name, str(reason))
-            return
-        if obstacle is not None:
-            self.findings.obstacles.append(obstacle)
+            if obstacle is not None:
+                self.findings.obstacles.append(obstacle)
 
 
 def _state_of(state: Optional[Element], tag: str, name: str) -> Optional[Element]:

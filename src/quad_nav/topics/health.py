@@ -10,7 +10,7 @@ import enum
 from dataclasses import dataclass, field
 from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-from quad_nav.navigator.tick import State
+from quad_nav.navigator.state import State
 from quad_nav.scenario.coverage import robots_text
 
 SLOW_BELOW = 0.8

@@ -19,7 +19,7 @@ import yaml
 
 from quad_nav.errors import InputError, printable
 from quad_nav.files.shipped import shipped
-from quad_nav.scenario.rules import RANDOM
+from quad_nav.scenario import RANDOM
 from quad_nav.scenario.scenario import scene_of
 from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.scene import Scene

@@ -13,7 +13,8 @@ from quad_nav.cli.options import echo, raise_on_signals
 from quad_nav.cli.progress import FlightPace, flights_progress
 from quad_nav.errors import printable
 from quad_nav.scenario.warm_up import simulate, warm_up
-from quad_tune.evaluation import Course, StudyObserver
+from quad_tune.courses import Course
+from quad_tune.evaluation import StudyObserver
 from quad_tune.flight_result import FlightResult
 from quad_tune.parameter_files import base_configuration
 

@@ -13,8 +13,7 @@ from quad_nav.files.shipped import shipped
 from quad_nav.offline.workers import LocalWorkers, RayWorkers, Workers
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.simulation_params import SimulationParams
-from quad_tune.courses import Mission, MissionOptions
-from quad_tune.evaluation import CourseOptions
+from quad_tune.courses import CourseOptions, Mission, MissionOptions
 
 
 def course_of(

@@ -1,5 +1,5 @@
 """Reports of studies and sweeps, built on the reports of flights.
 
-Reading order: ``search_pictures`` (history, importances, values), ``outcome_pictures`` (time
-against gap, base against tuned), ``tune_page``, ``sweep_page``.
+Reading order: ``panels`` (plots in a grid, on the page and on paper), ``tune_plots``,
+``tune_page``, ``sweep_measures``, ``sweep_plot``, ``sweep_page``.
 """

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any, List, Sequence, Tuple
 
-from quad_nav.report.plot import ALARM, INK, QUIET, Json, Plot, axis, layout, plot_text, rgb
+from quad_nav.report.plot import ALARM, INK, QUIET, Json, Plot, axis, plot_text, rgb
+from quad_tune.report.panels import Panel, panel_plot
 from quad_tune.report.sweep_measures import (
     MEASURES,
     Estimate,
@@ -17,8 +18,7 @@ from quad_tune.report.sweep_measures import (
 from quad_tune.study_text import format_value
 from quad_tune.sweep import SweepRow
 
-_COLUMNS = ((0.0, 0.46), (0.54, 1.0))
-_GAP_PX, _TOP_PX, _BOTTOM_PX = 70, 60, 52  # between the rows of panels, above and below them
+_COLUMNS = 2
 _BETTER = ([0.0, "#d73027"], [0.5, "#fee08b"], [1.0, "#1a9850"])  # plotly.js has no such scale
 _MAX_NUMBERS = 100  # largest map with numbers in its cells
 
@@ -35,49 +35,13 @@ def sweep_plot(rows: Sequence[SweepRow]) -> Plot:
 
 
 def _panels(rows: Sequence[SweepRow], draw: Any, panel_px: int, xlabel: str) -> Plot:
-    """Place the panels in two columns with titles."""
-    lines = -(-len(MEASURES) // len(_COLUMNS))
-    traces: List[Json] = []
-    axes: Json = {}
-    titles = []
-    plot_px = lines * panel_px + (lines - 1) * _GAP_PX
-    height, gap = panel_px / plot_px, _GAP_PX / plot_px
+    panels = []
     for k, measure in enumerate(MEASURES):
-        line, column = divmod(k, len(_COLUMNS))
-        top = 1.0 - line * (height + gap)
-        suffix = "" if k == 0 else str(k + 1)
-        found, x, y = draw(rows, measure, column == 0)
-        x["title"]["text"] = plot_text(xlabel) if line == lines - 1 else ""
-        axes[f"xaxis{suffix}"] = {**x, "domain": _COLUMNS[column], "anchor": f"y{suffix}"}
-        axes[f"yaxis{suffix}"] = {
-            **y,
-            "domain": (max(top - height, 0.0), top),
-            "anchor": f"x{suffix}",
-        }
-        traces += [{**trace, "xaxis": f"x{suffix}", "yaxis": f"y{suffix}"} for trace in found]
-        titles.append(_title(measure, _COLUMNS[column][0], top))
-    margin = {"l": 56, "r": 12, "t": _TOP_PX, "b": _BOTTOM_PX}
-    return Plot(
-        "sweep",
-        "Measures over the values",
-        traces,
-        layout(**axes, annotations=titles, showlegend=False, margin=margin),
-        height_px=plot_px + _TOP_PX + _BOTTOM_PX,
-    )
-
-
-def _title(measure: Measure, x: float, y: float) -> Json:
-    """Return the title of a panel whose upper left corner is at (x, y) of the paper."""
-    return {
-        "text": f"<b>{measure.title}</b>",
-        "xref": "paper",
-        "yref": "paper",
-        "x": x,
-        "y": y,
-        "xanchor": "left",
-        "yanchor": "bottom",
-        "showarrow": False,
-    }
+        traces, x, y = draw(rows, measure, k % _COLUMNS == 0)
+        is_last = k >= len(MEASURES) - _COLUMNS
+        x["title"]["text"] = plot_text(xlabel) if is_last else ""
+        panels.append(Panel(measure.title, traces, x, y))
+    return panel_plot("sweep", "Measures over the values", panels, _COLUMNS, panel_px)
 
 
 def _curve(

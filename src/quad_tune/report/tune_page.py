@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Dict, List, Sequence
+from typing import List
 
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report import style
@@ -15,14 +15,15 @@ from quad_nav.report.page import MAX_STRIPS, Page, Section, picture, render
 from quad_nav.report.paths import flown_paths
 from quad_nav.report.timeline import timeline
 from quad_tune import study_text
-from quad_tune.report.outcome_pictures import held_out_picture, pareto_picture
-from quad_tune.report.search_pictures import (
-    history_picture,
-    importance_picture,
+from quad_tune.report.panels import plot_section
+from quad_tune.report.tune_plots import (
+    held_out_plot,
+    history_plot,
+    importance_plot,
     importances,
-    slice_picture,
+    pareto_plot,
+    slices_plot,
 )
-from quad_tune.report.tune_plots import held_out_plot, history_plot, pareto_plot
 from quad_tune.score import TERMS
 from quad_tune.search import is_complete
 from quad_tune.statistics import STATISTICS, FlightStatistics, flight_statistics
@@ -62,21 +63,13 @@ def tune_page(result: TuneResult, before: FlightTrace, after: FlightTrace, comma
 
 
 def _held_out(result: TuneResult) -> Section:
-    held_out = result.held_out
-    return Section(
+    return plot_section(
         "held-out",
         "Held-out flights",
-        f"{len(held_out.cases)} flights with each set of parameters. A line connects flights of "
-        "the same mission and seed, black bars are means with their 95 % intervals. Vertical axes "
-        "start at 0. A gap is the smaller of clearance and separation.",
-        plots=(held_out_plot(result),),
-        paper=(
-            picture(
-                "held_out",
-                "Times and gaps of the base and the tuned parameters",
-                held_out_picture(held_out.base, held_out.tuned),
-            ),
-        ),
+        f"{len(result.held_out.cases)} flights with each set of parameters. A line connects "
+        "flights of the same mission and seed, black bars are means with their 95 % intervals. "
+        "Vertical axes start at 0. A gap is the smaller of clearance and separation.",
+        held_out_plot(result),
     )
 
 
@@ -106,79 +99,45 @@ def _flights(before: FlightTrace, after: FlightTrace) -> Section:
 def _search(result: TuneResult) -> List[Section]:
     reference = flight_statistics(result.reference)
     importance = importances(result.trials, result.setup.space)
-    return [
-        _history(result, reference),
-        _pareto(result, reference),
-        *_importances(importance),
-        _slices(result, reference, list(importance) or list(result.setup.space.paths)),
-    ]
-
-
-def _history(result: TuneResult, reference: FlightStatistics) -> Section:
-    plot = history_picture(result.trials, reference.cost)
-    return Section(
+    order = list(importance) or list(result.setup.space.paths)
+    history = plot_section(
         "history",
         "Search",
         "Mean cost of each candidate; lower is better. Pruned candidates did not fly all flights. "
         "The vertical axis does not start at 0; costs above it, of failed missions, are red.",
-        plots=(history_plot(result, reference.cost),),
-        paper=(picture("history", "Cost of each candidate", plot),),
+        history_plot(result, reference.cost),
     )
-
-
-def _importances(importance: Dict[str, float]) -> List[Section]:
-    """Return the section, or nothing if there are too few trials."""
-    if not importance:
-        return []
-    plot = importance_picture(importance)
-    return [
-        Section(
-            "importances",
-            "Importance of the parameters",
-            "How strongly each parameter separates good candidates from the others (PED-ANOVA).",
-            (picture("importances", "Importance of each parameter", plot),),
-        )
-    ]
-
-
-def _slices(result: TuneResult, reference: FlightStatistics, order: Sequence[str]) -> Section:
-    plot = slice_picture(
-        result.trials,
-        result.setup.space,
-        order,
-        result.refined.values,
-        dict(result.setup.base),
-        reference.cost,
-    )
-    return Section(
+    slices = plot_section(
         "slices",
         "Values",
         "Value and cost of each candidate, for each searched parameter. There is no line for the "
         "tuned value where the base's value was kept. Axes do not start at 0.",
-        (picture("slices", "Cost over the values of each parameter", plot),),
+        slices_plot(result, order, reference.cost),
     )
+    if not importance:
+        return [history, _pareto(result, reference), slices]
+    bars = plot_section(
+        "importances",
+        "Importance of the parameters",
+        "How strongly each parameter separates good candidates from the others (PED-ANOVA).",
+        importance_plot(importance),
+    )
+    return [history, _pareto(result, reference), bars, slices]
 
 
 def _pareto(result: TuneResult, reference: FlightStatistics) -> Section:
-    complete = [trial for trial in result.trials if is_complete(trial)]
     candidates = {
-        trial.number: FlightStatistics(**trial.user_attrs[STATISTICS]) for trial in complete
+        trial.number: FlightStatistics(**trial.user_attrs[STATISTICS])
+        for trial in result.trials
+        if is_complete(trial)
     }
     gains = result.refined.gains
-    tuned = gains[0].with_it if gains else reference
-    return Section(
+    return plot_section(
         "pareto",
         "Time against gap",
         f"{len(candidates)} candidates completed all flights. The plot shows those that reached "
         "every goal without contact. No candidate beats one of the front in both time and gap. "
         "The tuned parameters have flown more flights than the others. The axis of the time does "
         "not start at 0.",
-        plots=(pareto_plot(candidates, reference, tuned),),
-        paper=(
-            picture(
-                "pareto",
-                "Mean time and smallest gap of candidates",
-                pareto_picture(list(candidates.values()), reference, tuned),
-            ),
-        ),
+        pareto_plot(candidates, reference, gains[0].with_it if gains else reference),
     )

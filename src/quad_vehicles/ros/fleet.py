@@ -23,7 +23,7 @@ from quad_nav.files.values import (
     Rule,
     choice,
     number,
-    optional_text,
+    optional,
     text,
     value_faults,
 )
@@ -37,6 +37,7 @@ from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event_from_mess
 from quad_nav.topics.vehicle_states import IN_FLIGHT, ON_GROUND, State, state_from_message
 from quad_vehicles.ros.node import LAND_ALL_TOPIC
 from quad_vehicles.ros.scene_topics import SceneLidars, SceneTopics
+from quad_vehicles.ros.topics import call_trigger
 from quad_vehicles.starts import starts_of
 from quad_vehicles.vehicle_file import Vehicle, load_vehicles
 
@@ -62,7 +63,7 @@ _DEFAULTS: Dict[str, Any] = {
 }
 _RULES: Dict[str, Rule] = {
     "vehicles": text("the file of the vehicles"),
-    "scene": optional_text("a scene's file"),
+    "scene": optional(text("a scene's file")),
     "lidar_for": choice(("none", "vehicles")),
     "lidar_rate": number(above=0.0, at_most=100.0, unit="Hz"),
     "scan_range": number(above=0.0, unit="radians"),
@@ -235,7 +236,7 @@ class VehicleFleet:
         refused = {one.name: f"no response within {CALL_WAIT_S:g} s" for one in vehicles}
 
         def call(vehicle: Vehicle) -> None:
-            problem = _call(f"/vehicle{vehicle.number}/{action}")
+            problem = call_trigger(f"/vehicle{vehicle.number}/{action}")
             if problem:
                 refused[vehicle.name] = problem
             else:
@@ -260,16 +261,6 @@ def _ordered(landings: Sequence[Empty]) -> List[str]:
 def _is_stopped(robot: int) -> bool:
     """Return whether the mission of a robot is stopped."""
     return rospy.get_param(f"/mission/quad{robot}/stopped", False) is True
-
-
-def _call(service: str) -> str:
-    """Call a service; return why it has failed, "" if it has not."""
-    try:
-        rospy.wait_for_service(service, 2.0)
-        response = rospy.ServiceProxy(service, Trigger)()
-    except (rospy.ROSException, rospy.ServiceException) as error:
-        return f"{service}: {error}"
-    return "" if response.success else response.message or "refused without giving a reason"
 
 
 def read_setup(

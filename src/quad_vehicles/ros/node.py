@@ -208,8 +208,7 @@ class VehicleNode:
     def _land(self, _: TriggerRequest) -> TriggerResponse:
         """Begin to land; the action waits for the end."""
         with self._bridge.lock:
-            response = LAND.begin(self._bridge.machine, time.monotonic())
-        return TriggerResponse(response.is_accepted, response.text)
+            return _reply(LAND.begin(self._bridge.machine, time.monotonic()))
 
     def _resume(self, _: TriggerRequest) -> TriggerResponse:
         """Take control again, and resume the mission."""
@@ -220,12 +219,11 @@ class VehicleNode:
         response = self._finish(RESUMPTION)
         if response.is_accepted:
             self._pause.resume()
-        return TriggerResponse(response.is_accepted, response.text)
+        return _reply(response)
 
     def _take_off(self, _: TriggerRequest) -> TriggerResponse:
         """Take off, and respond when the vehicle hovers or has given up."""
-        response = self._finish(TAKE_OFF)
-        return TriggerResponse(response.is_accepted, response.text)
+        return _reply(self._finish(TAKE_OFF))
 
     def _finish(self, maneuver: Maneuver) -> Response:
         """Begin a maneuver, and wait for its end."""
@@ -242,6 +240,10 @@ class VehicleNode:
                 return outcome
             time.sleep(TICK_S)
         return Response(False, f"still {machine.state.value} after {MANEUVER_WAIT_S:g} s")
+
+
+def _reply(response: Response) -> TriggerResponse:
+    return TriggerResponse(response.is_accepted, response.text)
 
 
 def read_vehicle(parameters: Dict) -> Tuple[Vehicle, Permissions]:

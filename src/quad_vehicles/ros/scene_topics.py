@@ -20,10 +20,10 @@ from visualization_msgs.msg import MarkerArray
 from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.conversions import (
     ScanMessage,
-    marker_array,
     pose_from_transform,
     scan_message,
 )
+from quad_nav.ros.common.marker_messages import marker_array
 from quad_nav.ros.common.nav_messages import map_message
 from quad_nav.ros.common.own_messages import flight_info_message
 from quad_nav.scenario.scene_map import scene_map

@@ -31,7 +31,7 @@ from quad_vehicles.states import VehicleMachine
 from quad_vehicles.telemetry import Estimate, Landed
 from quad_vehicles.vehicle_file import Vehicle
 
-_MISSION_WAIT_S = 2.0
+_SERVICE_WAIT_S = 2.0
 _MISSION_PERIOD_S = 1.0
 _TAKE_OFFS = "~take_offs"  # parameter: x, y, yaw and z of the first and of the last one
 Place = Tuple[Pose2D, float]
@@ -264,7 +264,9 @@ class MissionPause:
         try:
             if not wanted and self._is_taken_over():
                 wanted = "" if rospy.get_param(f"{self._prefix}/stopped", False) else "stop"
-            problem = wanted and self._call(f"{self._prefix}/{wanted}")
+            service = f"{self._prefix}/{wanted}"
+            problem = call_trigger(service) if wanted else ""
+            problem = problem and f"{service}: {problem}"
         except Exception as error:  # without this thread no stop would be delivered any more
             problem = f"{self._prefix}: {error!r}"
         if problem and problem != self._problem and not rospy.core.is_shutdown_requested():
@@ -275,14 +277,15 @@ class MissionPause:
                 self._wanted = ""
         return not problem
 
-    def _call(self, service: str) -> str:
-        """Call a service; return why it has failed, "" if it has not."""
-        try:
-            rospy.wait_for_service(service, _MISSION_WAIT_S)
-            response = rospy.ServiceProxy(service, Trigger)()
-        except (rospy.ROSException, rospy.ServiceException) as error:
-            return f"{service}: {error}"
-        if not response.success:
-            return f"{service}: {response.message or 'refused without giving a reason'}"
-        rospy.loginfo("%s: %s", service, response.message)
-        return ""
+
+def call_trigger(service: str) -> str:
+    """Call a service; return why it has failed, "" if it has not."""
+    try:
+        rospy.wait_for_service(service, _SERVICE_WAIT_S)
+        response = rospy.ServiceProxy(service, Trigger)()
+    except (rospy.ROSException, rospy.ServiceException) as error:
+        return str(error)
+    if not response.success:
+        return response.message or "refused without giving a reason"
+    rospy.loginfo("%s: %s", service, response.message)
+    return ""

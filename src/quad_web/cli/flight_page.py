@@ -38,14 +38,7 @@ class FlightPage:
         return WebView(self._process, self._actions)
 
     def wants_flight(self, is_interrupted: Callable[[], bool]) -> bool:
-        """Wait until people want another flight.
-
-        Args:
-            is_interrupted: Returns true after Ctrl-C.
-
-        Returns:
-            False if there will be none: Ctrl-C, or the server has ended.
-        """
+        """Wait until people want another flight; false after Ctrl-C, or if the server has ended."""
         while self._actions.stop_reason != STARTED_AGAIN:
             if not self._process.is_alive:
                 echo("page: its server has ended", err=True)
@@ -53,10 +46,7 @@ class FlightPage:
             if is_interrupted():
                 return False
             self._process.wait(_LOOKS_EVERY_S)
-            self._process.poll()
-            calls, self._process.calls = self._process.calls, []
-            for call in calls:
-                self._process.answer(call, self._actions.carry_out(call.name, call.arguments))
+            self._process.serve(self._actions)
         return True
 
     def close(self) -> None:

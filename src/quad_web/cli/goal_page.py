@@ -9,8 +9,7 @@ from quad_nav.scenario.flight_setup import FlightOptions
 from quad_nav.scenario.preview import MissionPreview
 from quad_web.cli.flight_page import announce
 from quad_web.offline.waiting_mission import WaitingMission
-from quad_web.process import require_nicegui
-from quad_web.server import Server, WebOptions
+from quad_web.server import Server, WebOptions, require_nicegui
 from quad_web.view.state import FleetState
 
 
@@ -22,13 +21,7 @@ class GoalPage:
     """
 
     def __init__(self, options: FlightOptions, preview: MissionPreview, title: str) -> None:
-        """Check that there is something to edit; nothing is served yet.
-
-        Args:
-            options: What is flown.
-            preview: The same, read.
-            title: Heading of the page.
-        """
+        """Check that there is something to edit; ``preview`` is what the options say, read."""
         require_nicegui()
         if not preview.files:
             raise InputError(
@@ -41,10 +34,7 @@ class GoalPage:
         self._options, self._title = options, title
 
     def serve(self, open_it: bool) -> None:
-        """Serve the page until Ctrl-C or SIGTERM.
-
-        Args:
-            open_it: Open it in the browser.
+        """Serve the page until Ctrl-C or SIGTERM; ``open_it`` opens it in the browser.
 
         Raises:
             InputError: It cannot be served.

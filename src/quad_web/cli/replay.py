@@ -44,33 +44,32 @@ def _play(path: Path, address: str, port: int, open_it: bool) -> None:
     """
     # Imported here, because the readers load slowly, and --help does not need them.
     from quad_web.cli.flight_page import announce
-    from quad_web.process import require_nicegui
-    from quad_web.replay.replay import OpenedReplay
-    from quad_web.server import Server, WebOptions
+    from quad_web.replay.replay import Replay
+    from quad_web.server import Server, WebOptions, require_nicegui
     from quad_web.view.state import FleetState
 
     require_nicegui()
     echo(f"reading {path}", err=True)
     state = FleetState()
-    replay = OpenedReplay(path, state)
-    server = Server(state, replay, WebOptions(address=address, port=port, title=path.name))
+    player = Replay(path, state)
+    server = Server(state, player, WebOptions(address=address, port=port, title=path.name))
 
     def run() -> None:
-        replay.run()
+        player.run()
         server.stop()  # the file cannot be read, or not any more
 
     threading.Thread(target=run, name="player", daemon=True).start()
     try:
-        replay.is_read.wait(_SOON_S)
-        if not replay.faults:
+        player.is_read.wait(_SOON_S)
+        if not player.faults:
             server.start()
             announce(server.urls, open_it)
             server.wait()
     except InputError:
-        if not replay.faults:  # else the server was stopped before it had started
+        if not player.faults:  # else the server was stopped before it had started
             raise
     finally:
-        replay.close()
+        player.close()
         server.stop()
-    if replay.faults:
-        raise InputError(replay.faults)
+    if player.faults:
+        raise InputError(player.faults)

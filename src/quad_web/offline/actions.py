@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, List, Mapping, Optional, Sequence
 
 import numpy as np
 
@@ -14,15 +14,8 @@ from quad_nav.geometry import Pose2D
 from quad_nav.mission.goal import MAX_COORDINATE_M
 from quad_nav.offline.flight import Flight
 from quad_nav.scenario.goal_checks import place_check
-from quad_web.view.actions import (
-    FLIGHT_ACTIONS,
-    Actions,
-    Answer,
-    GoalChange,
-    GoalFileView,
-    ParameterView,
-)
-from quad_web.view.goal_files import GoalFiles
+from quad_web.view.actions import FLIGHT_ACTIONS, Answer, GoalChange, ParameterView
+from quad_web.view.goal_files import GoalEditing, GoalFiles
 
 STOPPED = "stopped by a person"
 STARTED_AGAIN = "started again by a person"
@@ -31,10 +24,8 @@ HAS_ENDED = "the flight has ended; reset starts it again"
 _OF_ENDED = ("reset", "parameters", "goal_files", "check_goals", "save_goals", "set_rate")
 """Actions that an ended flight has."""
 
-Event = Tuple[float, str, str, Optional[int]]
 
-
-class FlightActions(Actions):
+class FlightActions(GoalEditing):
     """Carries out what people do, between two instants of odometry.
 
     Attributes:
@@ -58,7 +49,6 @@ class FlightActions(Actions):
         self._flight: Optional[Flight] = None
         self._has_ended = False
         self._loaded: List[Configuration] = []
-        self._files = GoalFiles({}, lambda robot: None)
 
     @property
     def state(self) -> str:
@@ -94,15 +84,13 @@ class FlightActions(Actions):
         """Note that the flight has ended."""
         self._has_ended = True
 
-    def carry_out(self, name: str, arguments: Mapping[str, Any]) -> Any:
+    def call(self, name: str, *arguments: Any) -> Any:
         """Return what comes of an action of a person."""
         self.version += 1
-        if name not in self.available:
-            return Answer(False, f"{name}: not possible here")
         if self._has_ended and name not in _OF_ENDED:
             return Answer(False, HAS_ENDED)
         try:
-            return getattr(self, name)(**arguments)
+            return super().call(name, *arguments)
         except InputError as error:
             return Answer(False, "; ".join(error.problems))
 
@@ -195,17 +183,9 @@ class FlightActions(Actions):
         named = ", ".join(f"{name} {in_force[name]}" for name in values if name in in_force)
         return self._did(robot, f"{namespace or 'move_base'}: {named}")
 
-    def goal_files(self) -> Sequence[GoalFileView]:
-        """Return the goal files of the mission as they are now."""
-        return self._files.goal_files()
-
-    def check_goals(self, robot: int, version: str, goals: Sequence[GoalChange]) -> List[str]:
-        """Return the fault of each goal, "" for a good one."""
-        return self._files.check_goals(robot, version, goals)
-
     def save_goals(self, robot: int, version: str, goals: Sequence[GoalChange]) -> Answer:
         """Check the goals of a robot, write its file, and fly it from now on."""
-        answer = self._files.save_goals(robot, version, goals)
+        answer = super().save_goals(robot, version, goals)
         if not answer.ok or self._has_ended:
             return answer
         self.flight.replace_goals(robot, self.flight.setup.robots[robot].file.load())
@@ -225,16 +205,9 @@ class FlightActions(Actions):
         return Answer(True, line)
 
 
-def parameter_views(
-    configuration: Configuration, loaded: Configuration
-) -> Tuple[ParameterView, ...]:
-    """Return a configuration's parameters that can be changed in flight.
-
-    Args:
-        configuration: The configuration in force.
-        loaded: The configuration of the files.
-    """
-    views = []
+def parameter_views(configuration: Configuration, loaded: Configuration) -> List[ParameterView]:
+    """Return the parameters that can change, of the configurations in force and of the files."""
+    views: List[ParameterView] = []
     for namespace, parameters in config.reconfigurable(configuration).items():
         values = config.values(configuration, namespace)
         start = config.values(loaded, namespace)
@@ -252,4 +225,4 @@ def parameter_views(
             )
             for one in parameters
         ]
-    return tuple(views)
+    return views

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from typing import Dict, FrozenSet, List, Optional, Sequence, Set, Tuple
+from typing import Dict, List, Optional, Sequence, Set, Tuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from quad_nav.costmap.cost_grid import occupancy
 from quad_nav.loop.inspection import (
@@ -83,13 +82,7 @@ class FlightItems:
     def sample(
         self, wanted: Optional[Sequence[Wanted]], actions: FlightActions, rate: float
     ) -> Tuple[List[Item], Tuple[str, ...]]:
-        """Return new items, and the keys of items that are gone.
-
-        Args:
-            wanted: What the pages show; None for everything.
-            actions: What people want.
-            rate: Simulated seconds per second of wall time that were achieved.
-        """
+        """Return new items, and the keys of items that are gone; ``wanted`` None is everything."""
         robots_of = robots_by_layer(wanted, self._robots)
         views = self._flight.loop.inspect(
             Inspection({part: robots_of[part] for part in _PARTS if robots_of[part]})
@@ -103,7 +96,9 @@ class FlightItems:
         self._has_contacts = False
         items += self._present_items(views, actions, rate)
         items += self._trails.items(sorted(robots_of["trail"]))
-        passing = self._cells(views, robots_of["cell"])
+        radii_m = {v.robot: v.safety_radius_m for v in views if v.robot in robots_of["cell"]}
+        positions = self._flight.states.poses[:, :2]
+        passing = cell_items(self._flight.setup.scene, positions, radii_m)
         for view in views:
             passing += _navigator_items(view)
         keys = {item.key for item in passing}
@@ -134,14 +129,20 @@ class FlightItems:
         flight, setup = self._flight, self._flight.setup
         poses = poses_item(flight.now_s, time.time(), flight.states.bodies.rows)
         moving = flight.simulation.movers.poses(flight.now_s)
-        samples = self._samples_item(poses, moving, views)
-        values = samples.arrays["values"]
-        yields = [
-            row
-            for view in views
-            for row in rows.yield_rows(view.robot, view.decision, view.limited_by, self._names)
-        ]
-        status = [self._status_row(view, values[view.robot], actions) for view in views]
+        cycles_s = np.full(len(self._names), np.nan)
+        for view in views:
+            if view.cycle_wall_s is not None:
+                cycles_s[view.robot] = view.cycle_wall_s
+        samples = rows.samples_item(
+            flight.now_s,
+            poses.arrays["pose"],
+            setup.robot_radius_m,
+            setup.scene,
+            moving_solids(setup.scene, moving),
+            cycles_s,
+        )
+        now = {view.robot: self._robot_now(view, actions) for view in views}
+        status, yields = rows.fleet_items(now, self._names, samples)
         return [
             rows.flight_item(
                 "offline",
@@ -155,55 +156,26 @@ class FlightItems:
             poses,
             *self._obstacles.items(setup.scene, moving),
             samples,
-            rows.yields_item(yields),
-            *([rows.status_item(status)] if status else []),
+            yields,
+            *([status] if views else []),
         ]
 
-    def _samples_item(
-        self, poses: Item, moving: NDArray[np.float64], views: Sequence[NavigatorView]
-    ) -> Item:
-        """Return the samples of robots at poses among obstacles at poses float64[m, 3]."""
-        setup = self._flight.setup
-        cycles_s = np.full(len(self._names), np.nan)
-        for view in views:
-            if view.cycle_wall_s is not None:
-                cycles_s[view.robot] = view.cycle_wall_s
-        return rows.samples_item(
-            self._flight.now_s,
-            poses.arrays["pose"],
-            cycles_s,
-            setup.robot_radius_m,
-            setup.scene,
-            moving_solids(setup.scene, moving),
-        )
-
-    def _status_row(
-        self, view: NavigatorView, sample: Sequence[float], actions: FlightActions
-    ) -> Dict[str, object]:
-        robot = self._flight.robots[view.robot]
-        sequencer, speed_mps = robot.sequencer, float(sample[2])
-        state = rows.robot_state(
+    def _robot_now(self, view: NavigatorView, actions: FlightActions) -> rows.RobotNow:
+        sequencer = self._flight.robots[view.robot].sequencer
+        has_ended = actions.state == "ended"
+        return rows.RobotNow(
             view.state.value,
-            speed_mps,
-            yielding=view.decision,
+            view.decision,
+            view.limited_by,
             is_done=sequencer.done,
             is_stopped=view.stopped_reason != "",
-        )
-        reason = view.stopped_reason
-        if actions.state == "ended":
-            state, speed_mps = "done" if sequencer.done else "stopped", 0.0
-            reason = reason or HAS_ENDED
-        return rows.status_row(
-            view.robot,
-            state,
+            has_ended=has_ended,
             goal=None if sequencer.done else sequencer.index + 1,
             goals=len(sequencer.sequence.goals),
             said=self._columns(view),
-            speed_mps=speed_mps,
-            gap_m=float(sample[0]),
             recoveries=(view.recoveries_done, view.recoveries),
             lidar=actions.lidars[view.robot],
-            reason=reason,
+            reason=view.stopped_reason or (HAS_ENDED if has_ended else ""),
         )
 
     def _columns(self, view: NavigatorView) -> Dict[str, float]:
@@ -219,15 +191,6 @@ class FlightItems:
             body.twist,
         )
         return {topic.name: topic.fields(status)["data"] for topic in COLUMNS}
-
-    def _cells(self, views: Sequence[NavigatorView], robots: FrozenSet[int]) -> List[Item]:
-        positions, scene = self._flight.states.poses[:, :2], self._flight.setup.scene
-        return [
-            item
-            for view in views
-            if view.robot in robots
-            for item in cell_items(scene, positions, view.safety_radius_m, [view.robot])
-        ]
 
 
 def _navigator_items(view: NavigatorView) -> List[Item]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import collections
 import time
-from typing import Callable, Deque, List, Optional, Protocol, Tuple
+from typing import Callable, Deque, Optional, Tuple
 
 from quad_nav.mission.actions import Action, GoalEnded
 from quad_nav.offline.flight import Flight, FlightObserver
@@ -18,8 +18,8 @@ from quad_nav.sim.contacts import Contact
 from quad_nav.sim.pacing import RateMeter
 from quad_web.offline.actions import FlightActions
 from quad_web.offline.items import FlightItems
-from quad_web.process import Batch, Call
-from quad_web.view.state import MAX_EVENTS, Wanted
+from quad_web.process import Batch, ServerProcess
+from quad_web.view.state import MAX_EVENTS
 
 PERIOD_S = 0.1
 FULL_SPEED_PERIOD_S = 0.35
@@ -32,52 +32,16 @@ _MAX_LAG_S = 0.1
 _END_WITHIN_S = 5.0
 
 
-class Page(Protocol):
-    """The pages of a flight; ``web.process.ServerProcess`` is one."""
-
-    wanted: Tuple[Wanted, ...]
-    calls: List[Call]
-    is_alive: bool
-
-    @property
-    def can_take(self) -> bool:
-        """True if the last batch has arrived."""
-
-    def send(self, batch: Batch) -> None:
-        """Send a batch."""
-
-    def answer(self, call: Call, value: object) -> None:
-        """Answer an action."""
-
-    def poll(self) -> None:
-        """Take what has come."""
-
-    def wait(self, timeout_s: float) -> None:
-        """Wait until something comes, or time is up."""
-
-
 class WebView(FlightObserver):
-    """Shows a flight on pages.
-
-    The flight begins when the first page is open.
-
-    Attributes:
-        actions: What people did, and what they want.
-    """
+    """Shows a flight on pages; it begins when the first page is open."""
 
     def __init__(
         self,
-        page: Page,
+        page: ServerProcess,
         actions: FlightActions,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Show a flight.
-
-        Args:
-            page: The pages.
-            actions: Carries out what people do.
-            clock: Wall clock.
-        """
+        """Show a flight; ``clock`` is the wall clock."""
         self.actions = actions
         self._page, self._clock = page, clock
         self._next_look_s = self._next_sample_s = -float("inf")
@@ -127,11 +91,11 @@ class WebView(FlightObserver):
     def on_end(self, flight: Flight) -> None:
         """Show how the flight ended."""
         self.actions.end()
-        self._note(flight.now_s, _end_text(flight.reason), "info", None)
+        text = f"the flight has ended: {flight.reason}".rstrip(": ")
+        self._note(flight.now_s, text, "info", None)
         end_s = self._clock() + _END_WITHIN_S
         while self._page.is_alive and not self._page.can_take and self._clock() < end_s:
             self._page.wait(PERIOD_S)
-            self._page.poll()
         if self._page.can_take:
             self._send(everything=True)
 
@@ -143,10 +107,7 @@ class WebView(FlightObserver):
     def _look(self) -> None:
         """Answer people, and send a sample if one is due."""
         self._next_look_s = self._clock() + PERIOD_S
-        self._page.poll()
-        calls, self._page.calls = self._page.calls, []
-        for call in calls:
-            self._page.answer(call, self.actions.carry_out(call.name, call.arguments))
+        self._page.serve(self.actions)
         start_s = self._clock()
         subject = (self._flight.now_s, self._page.wanted, self.actions.version)
         is_due = start_s >= self._next_sample_s and subject != self._sampled
@@ -194,7 +155,3 @@ class WebView(FlightObserver):
                 self._look()
         if self.actions.is_paused:
             self._pace = None
-
-
-def _end_text(reason: str) -> str:
-    return f"the flight has ended: {reason}" if reason else "the flight has ended"

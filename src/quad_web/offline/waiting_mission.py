@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from dataclasses import replace
@@ -19,8 +18,8 @@ from quad_nav.scenario.flight_setup import FlightOptions
 from quad_nav.scenario.preview import NO_PLAN, MissionPreview, RobotPreview
 from quad_nav.sim.movers import Movers
 from quad_web.view import rows
-from quad_web.view.actions import Actions, Answer, GoalChange, GoalFileView
-from quad_web.view.goal_files import GoalFiles
+from quad_web.view.actions import Answer, GoalChange, GoalFileView
+from quad_web.view.goal_files import GoalEditing, GoalFiles
 from quad_web.view.items import (
     UNKNOWN_BODY,
     ObstacleItems,
@@ -34,23 +33,17 @@ from quad_web.view.items import (
 from quad_web.view.state import FleetState, Item
 
 
-class WaitingMission(Actions):
+class WaitingMission(GoalEditing):
     """Shows a mission as a flight that waits at its start; people edit its goal files.
 
     Goals are shown as the files have them, plans also as they are being edited.
     """
 
     available = frozenset({"goal_files", "check_goals", "save_goals"})
-    _refusal = "the flight has not begun; quad preview --edit edits goals only"
+    refusal = "the flight has not begun; quad preview --edit edits goals only"
 
     def __init__(self, options: FlightOptions, title: str, state: FleetState) -> None:
-        """Show a mission.
-
-        Args:
-            options: What is flown.
-            title: Heading of the pages.
-            state: What the pages show.
-        """
+        """Show a mission, with a title as the heading of the pages."""
         self._options, self._title, self._state = options, title, state
         self._lock = threading.RLock()
         self._files = GoalFiles({}, lambda robot: self._preview.check(robot))
@@ -58,7 +51,7 @@ class WaitingMission(Actions):
 
     # -- actions, in the pages' threads --------------------------------------------------
 
-    def goal_files(self) -> Sequence[GoalFileView]:
+    def goal_files(self) -> List[GoalFileView]:
         """Return the goal files as they are now; show them if they have changed."""
         with self._lock:
             files = self._files.goal_files()
@@ -69,7 +62,7 @@ class WaitingMission(Actions):
     def check_goals(self, robot: int, version: str, goals: Sequence[GoalChange]) -> List[str]:
         """Return the fault of each goal, "" for a good one, and show the plans to the good ones."""
         with self._lock:
-            faults = self._files.check_goals(robot, version, goals)
+            faults = self._files.check_goals(robot, goals)
             try:
                 content = self._files.edited(robot, version, goals, places=False)
                 sequence = parse_goals(content, str(self._files.files[robot]))
@@ -126,18 +119,23 @@ class WaitingMission(Actions):
         samples = rows.samples_item(
             0.0,
             poses.arrays["pose"],
-            np.full(len(names), math.nan),
             preview.robot_radius_m,
             scene,
             preview.moving,
         )
-        gaps_m = samples.arrays["values"][:, 0]
-        status = [_status_row(robot, float(gaps_m[robot.number])) for robot in robots]
+        now = {
+            robot.number: rows.RobotNow(
+                goal=1,
+                goals=len(robot.sequence.goals),
+                reason="; ".join((*filter(None, robot.faults), *robot.warnings)),
+            )
+            for robot in robots
+        }
         return [
             robots_item(names, preview.robot_radius_m),
             poses,
             samples,
-            rows.status_item(status),
+            rows.fleet_items(now, names, samples)[0],
             rows.goals_item([row for robot in robots for row in _goal_rows(robot)]),
             *map(_plan_item, robots),
             *self._costmap_items(),
@@ -160,17 +158,6 @@ def _goal_rows(robot: RobotPreview) -> List[Dict[str, Any]]:
         if fault:
             row["state"] = "failed"
     return goal_rows
-
-
-def _status_row(robot: RobotPreview, gap_m: float) -> Dict[str, Any]:
-    return rows.status_row(
-        robot.number,
-        "idle",
-        goal=1,
-        goals=len(robot.sequence.goals),
-        gap_m=gap_m,
-        reason="; ".join((*filter(None, robot.faults), *robot.warnings)),
-    )
 
 
 def _plan_item(robot: RobotPreview) -> Item:

@@ -48,14 +48,7 @@ class CostmapTrack:
         times_s: NDArray[np.float64],
         update_times_s: NDArray[np.float64],
     ) -> None:
-        """Show the costmap of ``topic``, updated by ``topic`` + "_updates".
-
-        Args:
-            index: The recording.
-            topic: Topic of the full grids.
-            times_s: float64[n], times of the full grids.
-            update_times_s: float64[m], times of the updates.
-        """
+        """Show the costmap of ``topic``, full grids float64[n], and its updates, float64[m]."""
         self._index, self._topic = index, topic
         self._times_s, self._update_times_s = times_s, update_times_s
         self._keyframes: OrderedDict[Tuple[int, int], bytes] = collections.OrderedDict()
@@ -72,14 +65,9 @@ class CostmapTrack:
     def at(
         self, place: Tuple[int, int], has_time: Callable[[], bool] = lambda: True
     ) -> Optional[RecordedCostmap]:
-        """Return the costmap at a place.
+        """Return the costmap at a place; ``has_time`` is asked after each update.
 
-        Args:
-            place: As of ``place``.
-            has_time: Asked after each update that is applied.
-
-        Returns:
-            None if it is malformed, or if there was no time for all updates: call it again.
+        None if it is malformed, or if there was no time for all updates: call it again.
 
         Raises:
             InputError: The file is damaged there.

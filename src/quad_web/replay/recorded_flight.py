@@ -6,10 +6,9 @@ import bisect
 import re
 import time
 from pathlib import Path
-from typing import Any, Callable, Dict, Hashable, Iterable, List, Mapping, Optional, Tuple
+from typing import Callable, Dict, Hashable, Iterable, List, Mapping, Optional, Tuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Scan
@@ -21,8 +20,6 @@ from quad_nav.topics.tracked_obstacles import TRACKS_TOPIC, rows_of_message
 from quad_web.replay.recorded_costmaps import CostmapTrack
 from quad_web.replay.recorded_obstacles import ObstacleTrack
 from quad_web.replay.recorded_robot import (
-    LOST_AFTER_S,
-    RecordedEvent,
     RobotTrack,
     events_of,
 )
@@ -75,10 +72,6 @@ class RecordedFlight:
     def __init__(self, path: Path, progress: Progress = no_progress) -> None:
         """Read the trace, and the index of what is read on demand.
 
-        Args:
-            path: The recording.
-            progress: Called often with the share that is read.
-
         Raises:
             InputError: As ``bag_trace.read_trace``.
         """
@@ -99,11 +92,8 @@ class RecordedFlight:
         self._costmaps: Dict[str, CostmapTrack] = {}
         self._has_time: Callable[[], bool] = lambda: True
         self.events = events_of(trace.robots)
-        self.events += [
-            RecordedEvent(contact.time_s, "warning", None, str(contact))
-            for contact in trace.contacts
-        ]
-        self.events.sort(key=lambda event: event.time_s)
+        self.events += [(one.time_s, str(one), "warning", None) for one in trace.contacts]
+        self.events.sort(key=lambda event: event[0])
 
     def close(self) -> None:
         """Close the file."""
@@ -121,13 +111,10 @@ class RecordedFlight:
         robots_of: Mapping[str, Iterable[int]],
         has_time: Callable[[], bool] = lambda: True,
     ) -> Dict[str, Part]:
-        """Return the layers at a time, by the items' keys.
+        """Return the layers of some robots at a time, by the items' keys.
 
-        Args:
-            time_s: Time of the flight.
-            robots_of: Robots of which a layer is shown, by layer.
-            has_time: Asked while a costmap is put together. Without time there is no item; the
-                next call goes on from there.
+        ``has_time`` is asked while a costmap is put together. Without time there is no item; the
+        next call goes on from there.
         """
         self._has_time = has_time
         parts: Dict[str, Part] = {}
@@ -143,14 +130,7 @@ class RecordedFlight:
         bodies = np.array([track.body(time_s) for track in self._tracks])
         poses = poses_item(time_s, time.time(), bodies)
         samples = self.sample(time_s, poses)
-        values = samples.arrays["values"]
-        status = [self._status_row(row, time_s, values[row]) for row in range(len(self.names))]
-        rights = [track.right_of_way(time_s) for track in self._tracks]
-        yields = [
-            line
-            for row, right in enumerate(rights)
-            for line in rows.yield_rows(row, right.decision, right.limited_by, self.names)
-        ]
+        now = {row: track.now(time_s) for row, track in enumerate(self._tracks)}
         contacts = [one for one in self._trace.contacts if one.time_s <= time_s]
         goals = [
             line for row, track in enumerate(self._tracks) for line in track.goal_rows(row, time_s)
@@ -159,8 +139,7 @@ class RecordedFlight:
             poses,
             *self._obstacles.items(time_s),
             samples,
-            rows.status_item(status),
-            rows.yields_item(yields),
+            *rows.fleet_items(now, self.names, samples),
             rows.contacts_item(contacts, self.names),
             rows.goals_item(goals),
         ]
@@ -170,39 +149,12 @@ class RecordedFlight:
         if poses is None:
             bodies = np.array([track.body(time_s) for track in self._tracks])
             poses = poses_item(time_s, 0.0, bodies)
-        unknown = np.full(len(self.names), np.nan)
         return rows.samples_item(
             time_s,
             poses.arrays["pose"],
-            unknown,
             self._trace.robot_radius_m,
             self._trace.scene,
             self._obstacles.solids(time_s),
-        )
-
-    def _status_row(self, row: int, time_s: float, sample: NDArray[np.float32]) -> Dict[str, Any]:
-        track = self._tracks[row]
-        age_s = track.age_s(time_s)
-        leg, goals = track.leg(time_s), track.goals
-        is_active = leg is not None and track.is_active(leg, time_s)
-        is_done = bool(goals) and leg is not None and not is_active and leg.index + 1 >= len(goals)
-        state = rows.robot_state(
-            track.state(time_s),
-            float(sample[2]),
-            yielding=track.right_of_way(time_s).decision,
-            is_done=is_done,
-            is_lost=age_s > LOST_AFTER_S,
-        )
-        return rows.status_row(
-            row,
-            state,
-            goal=leg.index + 1 if leg is not None and is_active else None,
-            goals=len(goals) or None,
-            said=track.columns(time_s),
-            speed_mps=float(sample[2]),
-            gap_m=float(sample[0]),
-            recoveries=track.recoveries(time_s),
-            age_s=age_s,
         )
 
     # -- layers --------------------------------------------------------------------------
@@ -289,7 +241,7 @@ class RecordedFlight:
             return None
         positions = np.array([track.body(time_s)[:2] for track in self._tracks])
         radius_m = self._trace.robot_radius_m + _MARGIN_M
-        return next(iter(cell_items(scene, positions, radius_m, [robot])), None)
+        return next(iter(cell_items(scene, positions, {robot: radius_m})), None)
 
     def _map_from(self, frame: str, robot: int, time_s: float) -> Pose2D:
         """Return the pose of a frame in ``map``; all but the odometry's are ``map``."""

@@ -34,14 +34,7 @@ class ObstacleTrack:
         index: RecordingIndex,
         times_s: Optional[Floats],
     ) -> None:
-        """Look up obstacles.
-
-        Args:
-            scene: The scene; without one there are no obstacles.
-            seed: The flight's seed.
-            index: The recording.
-            times_s: Times of the topic's messages, float64[n]; None without the topic.
-        """
+        """Look up obstacles; ``times_s`` are those of the topic's messages, None without it."""
         self._scene = scene if scene is not None and scene.moving_shapes else None
         self._index = index
         self._times_s = np.zeros(0) if times_s is None else times_s

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bisect
 import math
-from dataclasses import dataclass
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -24,14 +23,8 @@ LOST_AFTER_S = 1.0
 poses are not interpolated."""
 
 
-@dataclass(frozen=True)
-class RecordedEvent:
-    """An entry of the log of events, see ``view.state.Event``."""
-
-    time_s: float
-    level: str
-    robot: Optional[int]
-    text: str
+RecordedEvent = Tuple[float, str, str, Optional[int]]
+"""Time, text, level and robot of an entry of the log of events."""
 
 
 class RobotTrack:
@@ -125,7 +118,7 @@ class RobotTrack:
         has_ended = leg is not None and not self.is_active(leg, time_s)
         return None if number < 0 or has_ended else number
 
-    def state(self, time_s: float) -> str:
+    def _state(self, time_s: float) -> str:
         """Return the navigator's state; what the goals tell if the recording has no states."""
         number = bisect.bisect_right(self._state_times_s, time_s) - 1
         if number >= 0:
@@ -133,25 +126,40 @@ class RobotTrack:
         leg = self.leg(time_s)
         return "idle" if leg is None or not self.is_active(leg, time_s) else "controlling"
 
-    def said(self, name: str, time_s: float) -> Any:
+    def now(self, time_s: float) -> rows.RobotNow:
+        """Return what is known of the robot at a time."""
+        leg, goals, age_s = self.leg(time_s), self.goals, self.age_s(time_s)
+        is_active = leg is not None and self.is_active(leg, time_s)
+        is_done = leg is not None and not is_active and 0 < len(goals) <= leg.index + 1
+        right = self._said("right_of_way", time_s) or RightOfWay()
+        return rows.RobotNow(
+            self._state(time_s),
+            right.decision,
+            right.limited_by,
+            is_done=is_done,
+            is_lost=age_s > LOST_AFTER_S,
+            goal=leg.index + 1 if leg is not None and is_active else None,
+            goals=len(goals) or None,
+            said=self._columns(time_s),
+            recoveries=self._recoveries(time_s),
+            age_s=age_s,
+        )
+
+    def _said(self, name: str, time_s: float) -> Any:
         """Return what the robot said last on a topic of ``ROBOT_TOPICS``; None if nothing."""
         number = bisect.bisect_right(self._said_times_s.get(name, ()), time_s) - 1
         return self.robot.said[name][number][1] if number >= 0 else None
 
-    def right_of_way(self, time_s: float) -> RightOfWay:
-        """Return what the robot does for its peers."""
-        return self.said("right_of_way", time_s) or RightOfWay()
-
-    def columns(self, time_s: float) -> Dict[str, float]:
+    def _columns(self, time_s: float) -> Dict[str, float]:
         """Return the numbers of the topics in ``COLUMNS``; the distance to the goal is computed."""
         leg, pose = self.leg(time_s), self.pose(time_s)
         goal = leg.pose if leg is not None and self.is_active(leg, time_s) else None
-        said = {topic.name: self.said(topic.name, time_s) for topic in COLUMNS}
+        said = {topic.name: self._said(topic.name, time_s) for topic in COLUMNS}
         here = None if pose is None else pose.to_2d()
         known = {name: value for name, value in said.items() if value is not None}
         return {**known, "goal_distance": goal_distance_m(goal, here)}
 
-    def recoveries(self, time_s: float) -> Tuple[int, int]:
+    def _recoveries(self, time_s: float) -> Tuple[int, int]:
         """Return how many recovery behaviours began for the present goal, and how many exist."""
         leg = self.leg(time_s)
         since_s = -math.inf if leg is None else leg.sent_s
@@ -186,20 +194,17 @@ def events_of(robots: Sequence[RobotTrace]) -> List[RecordedEvent]:
     events: List[RecordedEvent] = []
     for row, robot in enumerate(robots):
         for goal in robot.goals:
+            name = f"goal {goal.index + 1}"
             place = f"({goal.pose.x_m:.2f}, {goal.pose.y_m:.2f})"
-            events.append(
-                RecordedEvent(goal.sent_s, "info", row, f"goal {goal.index + 1}: sent {place}")
-            )
-            if goal.ended_s is not None:
-                text = f"reached after {goal.ended_s - goal.sent_s:.1f} s"
-                level = "info" if goal.reached else "warning"
-                text = text if goal.reached else f"skipped: {goal.reason}"
-                events.append(
-                    RecordedEvent(goal.ended_s, level, row, f"goal {goal.index + 1}: {text}")
-                )
-        for at_s, name in robot.recoveries:
-            events.append(RecordedEvent(at_s, "warning", row, f"recovery {name}"))
+            events.append((goal.sent_s, f"{name}: sent {place}", "info", row))
+            if goal.ended_s is not None and goal.reached:
+                text = f"{name}: reached after {goal.ended_s - goal.sent_s:.1f} s"
+                events.append((goal.ended_s, text, "info", row))
+            elif goal.ended_s is not None:
+                events.append((goal.ended_s, f"{name}: skipped: {goal.reason}", "warning", row))
+        for at_s, recovery in robot.recoveries:
+            events.append((at_s, f"recovery {recovery}", "warning", row))
         for at_s, right in robot.said.get("right_of_way", ()):
             if right.decision is not None:
-                events.append(RecordedEvent(at_s, "info", row, right.text))
+                events.append((at_s, right.text, "info", row))
     return events

@@ -1,27 +1,21 @@
-"""Find messages of a recording by topic and time, without reading the others.
-
-The index has 24 bytes for each message; a few unpacked chunks stay in memory.
-"""
+"""Find messages of a recording by topic and time, without reading the others."""
 
 from __future__ import annotations
 
-import collections
 from pathlib import Path
-from typing import Dict, List, Optional, OrderedDict, Tuple
+from typing import Dict, List, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.rosbag1 import Reader, ReaderError
+from rosbags.rosbag1 import Reader
+from rosbags.rosbag1.reader import IndexData
 
 from quad_nav.recording.bag_file import Message, TopicFilter, recording_faults, wanted_kinds
 from quad_nav.recording.messages import decode
 
-_KEPT_BYTES = 64 * 2**20  # of unpacked chunks
-_CONNECTION = 7  # op of a bag's record that describes a topic
-
 
 class RecordingIndex:
-    """Random access to the messages of the wanted topics.
+    """Random access to the messages of the wanted topics; the index has 24 bytes for each.
 
     Attributes:
         kinds: Topics and their types, such as ``nav_msgs/Path``.
@@ -35,8 +29,7 @@ class RecordingIndex:
         """
         self._path = path
         self.kinds: Dict[str, str] = {}
-        self._kept: OrderedDict[int, bytes] = collections.OrderedDict()
-        places: Dict[str, List[Tuple[int, int, int]]] = {}
+        places: Dict[str, List[Tuple[int, ...]]] = {}
         with recording_faults(path):
             self._reader = Reader(path)
             self._reader.open()
@@ -59,66 +52,20 @@ class RecordingIndex:
         Raises:
             InputError: The file is damaged there, or cannot be read.
         """
-        stamp_ns, chunk, offset = self._places[topic][number].tolist()
+        place = IndexData(*self._places[topic][number].tolist())
+        connection = next(one for one in self._reader.connections if one.topic == topic)
         kind = self.kinds[topic]
         with recording_faults(self._path):
-            data = _content(self._unpacked(chunk), offset)
+            self._reader.indexes = {connection.id: [place]}  # the reader reads what is listed
+            _, stamp_ns, data = next(self._reader.messages([connection]))
             return Message(topic, kind, stamp_ns, decode(data, kind))
 
     def close(self) -> None:
         """Close the file."""
         self._reader.close()
 
-    def _unpacked(self, chunk: int) -> bytes:
-        if chunk in self._kept:
-            self._kept.move_to_end(chunk)
-            return self._kept[chunk]
-        data = self._kept[chunk] = self._read_chunk(chunk)
-        while len(self._kept) > 1 and sum(map(len, self._kept.values())) > _KEPT_BYTES:
-            self._kept.popitem(last=False)
-        return data
 
-    def _read_chunk(self, chunk: int) -> bytes:
-        place = self._reader.chunks[chunk]
-        file = self._reader.bio
-        assert file is not None
-        file.seek(place.datapos)
-        data = file.read(place.datasize)
-        if len(data) < place.datasize:
-            raise ReaderError(f"Got only {len(data)} of requested {place.datasize} bytes, damaged.")
-        unpacked: bytes = place.decompressor(data)
-        return unpacked
-
-
-def _content(data: bytes, offset: int) -> bytes:
-    """Return the serialized message at an offset of a chunk."""
-    while True:
-        header, offset = _field(data, offset)
-        content, offset = _field(data, offset)
-        if _op(header) != _CONNECTION:
-            return content
-
-
-def _field(data: bytes, offset: int) -> Tuple[bytes, int]:
-    """Return a field that its length precedes, and where the next one begins."""
-    end = offset + 4 + int.from_bytes(data[offset : offset + 4], "little")
-    if end > len(data):
-        raise ReaderError("Header of a message is damaged.")
-    return data[offset + 4 : end], end
-
-
-def _op(header: bytes) -> Optional[int]:
-    """Return the kind of a bag's record."""
-    offset = 0
-    while offset < len(header):
-        entry, offset = _field(header, offset)
-        name, _, value = entry.partition(b"=")
-        if name == b"op":
-            return value[0]
-    raise ReaderError("Header of a message is damaged.")
-
-
-def _sorted(places: List[Tuple[int, int, int]]) -> NDArray[np.int64]:
+def _sorted(places: List[Tuple[int, ...]]) -> NDArray[np.int64]:
     """Return places int64[n, 3] in the order of time."""
     array = np.array(places, dtype=np.int64).reshape(-1, 3)
     return array[np.argsort(array[:, 0], kind="stable")]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from pathlib import Path
-from typing import Callable, Dict, FrozenSet, Hashable, List, Optional
+from typing import Any, Callable, Dict, FrozenSet, Hashable, List, Optional
 
 import numpy as np
 
@@ -13,7 +13,14 @@ from quad_nav.errors import InputError
 from quad_web.replay.recorded_flight import RecordedFlight
 from quad_web.view.actions import Actions, Answer
 from quad_web.view.rows import flight_item
-from quad_web.view.state import LAYERS, OF_ONE_ROBOT, FleetState, Item, robots_by_layer
+from quad_web.view.state import (
+    LAYERS,
+    OF_ONE_ROBOT,
+    FleetState,
+    Item,
+    robots_by_layer,
+    with_history,
+)
 
 PERIOD_S = 0.1
 FASTEST = 50.0
@@ -27,27 +34,24 @@ SLOWEST, MAX_RATE = 0.01, 1000.0
 class Replay(Actions):
     """Puts a recorded flight into a state, as time passes.
 
-    It plays from when the first page is open. ``run`` is for a thread of its own.
+    While the file is read, the pages show how far it is. It plays from when the first page is open.
+    ``run`` is for a thread of its own.
+
+    Attributes:
+        is_read: Set when the file is read, or cannot be read.
+        faults: Why it cannot be read, or not any more.
     """
 
     available = frozenset({"start", "pause", "reset", "set_rate", "seek"})
 
     def __init__(
-        self,
-        flight: RecordedFlight,
-        state: FleetState,
-        clock: Callable[[], float] = time.monotonic,
+        self, path: Path, state: FleetState, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """Stand at the start of a flight.
-
-        Args:
-            flight: The flight.
-            state: What pages show.
-            clock: Wall clock.
-        """
-        self._flight, self._state, self._clock = flight, state, clock
+        """Read nothing yet; ``clock`` is the wall clock."""
+        self._path, self._state, self._clock = path, state, clock
+        self.is_read = threading.Event()
+        self.faults: List[str] = []
         self._changed = threading.Condition()
-        self._time_s = flight.start_s
         self._rate, self._is_playing = 1.0, True
         self._has_jumped = True
         self._is_closed = False
@@ -56,25 +60,38 @@ class Replay(Actions):
         self._told = 0  # events
         self._subject: object = None
         self._lacks_history = False
-        state.put_all([*flight.static_items, self._flight_item()])
+        self._next_told_s = -float("inf")
+        self._progress(0.0)
+
+    def _progress(self, share: float) -> None:
+        now_s = time.monotonic()
+        if now_s >= self._next_told_s:
+            self._next_told_s = now_s + _PROGRESS_PERIOD_S
+            title = f"reading {self._path.name}, {share:.0%}"
+            self._state.put_all([flight_item("replay", title, "starting", 0.0)])
 
     # -- actions, in the pages' threads --------------------------------------------------
 
+    def call(self, name: str, *arguments: Any) -> Any:
+        """Return what comes of an action."""
+        if name in self.available and (self.faults or not self.is_read.is_set()):
+            return Answer(False, f"{name}: the recording is still being read")
+        with self._changed:
+            answer = super().call(name, *arguments)
+            self._changed.notify()
+            return answer
+
     def start(self) -> Answer:
         """Play; from the start if the recording has ended."""
-        with self._changed:
-            if self._time_s >= self._flight.end_s:
-                self._jump(self._flight.start_s)
-            self._is_playing = True
-            self._changed.notify()
+        if self._time_s >= self._flight.end_s:
+            self._jump(self._flight.start_s)
+        self._is_playing = True
         return Answer(True, "playing")
 
     def pause(self) -> Answer:
         """Stand still."""
-        with self._changed:
-            self._is_playing = False
-            self._changed.notify()
-            return Answer(True, f"stands at {self._time_s:.1f} s")
+        self._is_playing = False
+        return Answer(True, f"stands at {self._time_s:.1f} s")
 
     def reset(self) -> Answer:
         """Go to the start of the recording."""
@@ -84,19 +101,15 @@ class Replay(Actions):
         """Set seconds of the recording per second; 0 is as fast as it goes."""
         if rate != 0.0 and not SLOWEST <= rate <= MAX_RATE:
             return Answer(False, f"rate: {rate:g}; expected 0, or {SLOWEST:g} to {MAX_RATE:g}")
-        with self._changed:
-            self._rate = rate
-            self._changed.notify()
+        self._rate = rate
         return Answer(True, f"rate: {rate:g}" if rate else f"rate: {FASTEST:g}, the fastest")
 
     def seek(self, time_s: float) -> Answer:
         """Go to a time of the flight; it plays on if it did."""
         if not time_s == time_s:
             return Answer(False, f"time: {time_s}; expected seconds")
-        with self._changed:
-            self._jump(min(max(time_s, self._flight.start_s), self._flight.end_s))
-            self._changed.notify()
-            return Answer(True, f"at {self._time_s:.1f} s")
+        self._jump(min(max(time_s, self._flight.start_s), self._flight.end_s))
+        return Answer(True, f"at {self._time_s:.1f} s")
 
     def _jump(self, time_s: float) -> None:
         self._time_s = time_s
@@ -105,16 +118,29 @@ class Replay(Actions):
     # -- the player's thread -------------------------------------------------------------
 
     def run(self) -> None:
-        """Play until ``close``.
+        """Read the file and play until ``close``, or until there are faults."""
+        try:
+            self.read()
+            while not self._is_closed:
+                self.step()
+                with self._changed:
+                    if not self._has_jumped and not self._is_closed:
+                        self._changed.wait(PERIOD_S)
+        except InputError as error:
+            self.faults = error.problems
+        finally:
+            self.is_read.set()
+
+    def read(self) -> None:
+        """Read the file, and stand at the start of its flight.
 
         Raises:
-            InputError: The file is damaged, or cannot be read any more.
+            InputError: The file cannot be read as a flight.
         """
-        while not self._is_closed:
-            self.step()
-            with self._changed:
-                if not self._has_jumped and not self._is_closed:
-                    self._changed.wait(PERIOD_S)
+        self._flight = RecordedFlight(self._path, self._progress)
+        self._time_s = self._flight.start_s
+        self._state.put_all([*self._flight.static_items, self._flight_item()])
+        self.is_read.set()
 
     def close(self) -> None:
         """End ``run``."""
@@ -181,17 +207,14 @@ class Replay(Actions):
         if not len(times_s):
             return []
         samples = [self._flight.sample(float(at_s)) for at_s in times_s]
-        last, values = samples.pop(), [sample.arrays["values"] for sample in samples]
-        history = np.array(values, np.float32).reshape(-1, len(self._flight.names), 4)
-        arrays = {**last.arrays, "times": times_s[:-1], "history": history}
-        return [*samples, Item("samples", last.data, arrays)]
+        last = samples.pop()
+        return [*samples, with_history(last, samples)]
 
     def _tell_events(self, time_s: float) -> None:
         """Append the events up to a time to the log, each once."""
         events = self._flight.events
-        while self._told < len(events) and events[self._told].time_s <= time_s:
-            event = events[self._told]
-            self._state.add_event(event.time_s, event.text, event.level, event.robot)
+        while self._told < len(events) and events[self._told][0] <= time_s:
+            self._state.add_event(*events[self._told])
             self._told += 1
 
     def _flight_item(self) -> Item:
@@ -209,81 +232,3 @@ class Replay(Actions):
             duration_s=flight.end_s,
             reason=flight.end_reason if has_ended else "",
         )
-
-
-class OpenedReplay(Actions):
-    """A replay whose file is read while pages are open: until then they show how far it is.
-
-    Attributes:
-        is_read: Set when the file is read, or cannot be read.
-        faults: Why it cannot be read, or not any more.
-    """
-
-    available = Replay.available
-    _refusal = "the recording is still being read"
-
-    def __init__(self, path: Path, state: FleetState) -> None:
-        """Read nothing yet.
-
-        Args:
-            path: The recording.
-            state: What pages show.
-        """
-        self._path, self._state = path, state
-        self.is_read = threading.Event()
-        self.faults: List[str] = []
-        self._player: Optional[Replay] = None
-        self._next_told_s = -float("inf")
-        self._progress(0.0)
-
-    def run(self) -> None:
-        """Read the file and play until ``close``, or until there are faults."""
-        try:
-            player = self.read()
-            self.is_read.set()
-            player.run()
-        except InputError as error:
-            self.faults = error.problems
-        finally:
-            self.is_read.set()
-
-    def read(self) -> Replay:
-        """Read the file, and return what plays it.
-
-        Raises:
-            InputError: The file cannot be read as a flight.
-        """
-        self._player = Replay(RecordedFlight(self._path, self._progress), self._state)
-        return self._player
-
-    def _progress(self, share: float) -> None:
-        now_s = time.monotonic()
-        if now_s >= self._next_told_s:
-            self._next_told_s = now_s + _PROGRESS_PERIOD_S
-            title = f"reading {self._path.name}, {share:.0%}"
-            self._state.put_all([flight_item("replay", title, "starting", 0.0)])
-
-    def start(self) -> Answer:
-        """Play."""
-        return self._player.start() if self._player else self._refused("start")
-
-    def pause(self) -> Answer:
-        """Stand still."""
-        return self._player.pause() if self._player else self._refused("pause")
-
-    def reset(self) -> Answer:
-        """Go to the start of the recording."""
-        return self._player.reset() if self._player else self._refused("reset")
-
-    def set_rate(self, rate: float) -> Answer:
-        """Set seconds of the recording per second; 0 is as fast as it goes."""
-        return self._player.set_rate(rate) if self._player else self._refused("set_rate")
-
-    def seek(self, time_s: float) -> Answer:
-        """Go to a time of the flight."""
-        return self._player.seek(time_s) if self._player else self._refused("seek")
-
-    def close(self) -> None:
-        """End ``Replay.run``."""
-        if self._player:
-            self._player.close()

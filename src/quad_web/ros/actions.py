@@ -6,7 +6,7 @@ import math
 import threading
 import time
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence
+from typing import Any, Dict, List, Mapping, Optional
 
 import rospy
 from actionlib_msgs.msg import GoalID
@@ -26,34 +26,21 @@ from quad_nav.topics.goal_routing import GoalRouter
 from quad_web.ros.calls import PATIENCE_S, CallFailed, call, in_threads, set_number
 from quad_web.ros.parameters import NavigatorParameters
 from quad_web.ros.source import FlightSource
-from quad_web.view.actions import (
-    FLIGHT_ACTIONS,
-    Actions,
-    Answer,
-    GoalChange,
-    GoalFileView,
-    ParameterView,
-)
-from quad_web.view.goal_files import GoalFiles
+from quad_web.view.actions import FLIGHT_ACTIONS, Answer, ParameterView
+from quad_web.view.goal_files import GoalEditing, GoalFiles
 
 _CONNECTS_WITHIN_S = 2.0
 _STOPS_WITHIN_S = 0.4  # then the goals are cancelled from here, whatever the sequencer does
 _POLL_S = 0.02
 
 
-class FlightActions(Actions):
+class FlightActions(GoalEditing):
     """Steers a flight by its services and topics."""
 
     available = FLIGHT_ACTIONS
 
     def __init__(self, source: FlightSource, robots: int, goals: Path) -> None:
-        """Connect to the topics of the goals.
-
-        Args:
-            source: Shows the flight.
-            robots: Number of robots.
-            goals: Folder of the mission's goal files; without files nothing can be edited.
-        """
+        """Steer the flight that ``source`` shows, with the goal files of a folder."""
         self._source, self._robots = source, range(robots)
         self._cancels = [
             rospy.Publisher(f"/move_base{i}/cancel", GoalID, queue_size=1) for i in self._robots
@@ -68,37 +55,41 @@ class FlightActions(Actions):
 
     # -- time ----------------------------------------------------------------------------
 
+    def call(self, name: str, *arguments: Any) -> Any:
+        """Return what comes of an action, also if a node fails."""
+        try:
+            return super().call(name, *arguments)
+        except CallFailed as error:
+            return Answer(False, str(error))
+
     def start(self) -> Answer:
         """Start the simulation, and resume a mission that was stopped."""
-        return self._answer(self._start)
-
-    def _start(self) -> str:
         texts = []
         if self._source.health.has_simulator or not self._source.health.is_stopped:
             texts.append(_triggered("/simulation/start"))
             self._source.expect_paused(False)
         if self._source.health.is_stopped:
             texts.append(_triggered(RESUME_SERVICE))
-        return "; ".join(texts)
+        return Answer(True, "; ".join(texts))
 
     def pause(self) -> Answer:
         """Stop the clock."""
-        return self._answer(self._pause)
-
-    def _pause(self) -> str:
         text = _triggered("/simulation/pause")
         self._source.expect_paused(True)
-        return text
+        return Answer(True, text)
 
     def reset(self) -> Answer:
         """Put every robot back to its start pose."""
-        return self._answer(lambda: _triggered("/simulation/reset"))
+        return Answer(True, _triggered("/simulation/reset"))
 
     def set_rate(self, rate: float) -> Answer:
         """Set simulated seconds per second; 0 is as fast as it goes."""
         if not 0.0 <= rate <= FASTEST_RATE:
             return Answer(False, f"rate {rate:g}; expected 0 to {FASTEST_RATE:g}")
-        return self._answer(lambda: _rate_text(set_number("/simulator", "rate", rate or 1000.0)))
+        set_rate = set_number("/simulator", "rate", rate or 1000.0)
+        is_fastest = set_rate >= FASTEST_RATE
+        text = "the simulation goes as fast as it can" if is_fastest else f"rate {set_rate:g}"
+        return Answer(True, text)
 
     # -- goals ---------------------------------------------------------------------------
 
@@ -196,28 +187,21 @@ class FlightActions(Actions):
 
     def clear_costmaps(self, robot: int) -> Answer:
         """Clear the obstacles in a robot's costmaps."""
-
-        def clear() -> str:
-            call(f"/move_base{robot}/clear_costmaps", Empty)
-            return f"quad{robot}: costmaps cleared"
-
-        return self._answer(clear)
+        call(f"/move_base{robot}/clear_costmaps", Empty)
+        return Answer(True, f"quad{robot}: costmaps cleared")
 
     def enable_lidar(self, robot: int, is_on: bool) -> Answer:
         """Switch a robot's LIDAR on or off."""
-        return self._answer(
-            lambda: _succeeded(
-                call(f"/simulation/lidar{robot}/enable", SetBool, SetBoolRequest(bool(is_on)))
-            )
-        )
+        request = SetBoolRequest(bool(is_on))
+        return Answer(True, _succeeded(call(f"/simulation/lidar{robot}/enable", SetBool, request)))
 
-    def parameters(self, robot: int) -> Sequence[ParameterView]:
+    def parameters(self, robot: int) -> List[ParameterView]:
         """Return the parameters of a robot's navigator; none if it does not respond."""
         try:
             return self._parameters.views(robot)
         except CallFailed as error:
             rospy.logwarn("web: quad%d: parameters cannot be shown: %s", robot, error)
-            return ()
+            return []
 
     def set_parameters(self, robot: int, namespace: str, values: Mapping[str, Any]) -> Answer:
         """Change parameters of one namespace."""
@@ -225,20 +209,6 @@ class FlightActions(Actions):
             return self._parameters.set(robot, namespace, values)
         except CallFailed as error:
             return Answer(False, f"quad{robot}: {error}")
-
-    # -- goal files ----------------------------------------------------------------------
-
-    def goal_files(self) -> Sequence[GoalFileView]:
-        """Return the goal files of the mission as they are now."""
-        return self._files.goal_files()
-
-    def check_goals(self, robot: int, version: str, goals: Sequence[GoalChange]) -> List[str]:
-        """Return the fault of each goal, "" for a good one."""
-        return self._files.check_goals(robot, version, goals)
-
-    def save_goals(self, robot: int, version: str, goals: Sequence[GoalChange]) -> Answer:
-        """Check the goals of a robot and write its file; the sequencer reads it in a second."""
-        return self._files.save_goals(robot, version, goals)
 
     def _check_of(self, robot: int) -> PlaceCheck:
         """Return the check of a robot's goals against the scene and its global costmap."""
@@ -248,12 +218,6 @@ class FlightActions(Actions):
             self._checks[robot] = known, place_check(*known)
         check: PlaceCheck = self._checks[robot][1]
         return check
-
-    def _answer(self, action: Callable[[], str]) -> Answer:
-        try:
-            return Answer(True, action())
-        except CallFailed as error:
-            return Answer(False, str(error))
 
 
 def _triggered(name: str) -> str:
@@ -269,10 +233,6 @@ def _succeeded(response: Any) -> str:
     if not response.success:
         raise CallFailed(response.message or "refused without giving a reason")
     return str(response.message)
-
-
-def _rate_text(rate: float) -> str:
-    return "the simulation goes as fast as it can" if rate >= FASTEST_RATE else f"rate {rate:g}"
 
 
 def _now() -> rospy.Time:

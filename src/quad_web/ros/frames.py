@@ -1,8 +1,6 @@
-"""Transforms that change slowly, and the clock, without hearing all of `/tf` and `/clock`.
+"""Transforms that change slowly, looked up from time to time while somebody uses them.
 
-A page needs where an odometry frame is in `map`, and where a LIDAR is on its robot. Hearing each
-message of a fleet for that would cost more than all the rest. So the transforms are looked up from
-time to time while somebody uses them. The node does not subscribe to `/clock`: the time is that of
+Hearing all of `/tf` and `/clock` of a fleet would cost more than all the rest. The time is that of
 the newest poses.
 """
 
@@ -10,7 +8,7 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Dict, Optional, Tuple
+from typing import Dict, Optional, Set, Tuple
 
 import rospy
 from rosgraph_msgs.msg import Clock
@@ -31,11 +29,6 @@ class Frames:
     """Transforms that are in use, looked up every `REFRESH_S` in a thread."""
 
     def __init__(self, robots: int) -> None:
-        """Start without transforms.
-
-        Args:
-            robots: Number of robots.
-        """
         self._robots = robots
         self._found: Dict[Tuple[str, str], Pose3D] = {}
         self._used_s: Dict[Tuple[str, str], float] = {}
@@ -57,18 +50,15 @@ class Frames:
     def _run(self) -> None:
         while not rospy.is_shutdown():
             self._asked.wait(REFRESH_S)
-            used = self._in_use()
+            since_s = time.monotonic() - USED_WITHIN_S
+            used = {pair for pair, at_s in list(self._used_s.items()) if at_s > since_s}
             if used:
                 self._look_up(used)
             self._asked.clear()
-            if not used.keys() <= self._found.keys():
+            if not used <= self._found.keys():
                 time.sleep(REFRESH_S)  # a transform that is missing is asked for all the time
 
-    def _in_use(self) -> Dict[Tuple[str, str], float]:
-        since_s = time.monotonic() - USED_WITHIN_S
-        return {pair: at_s for pair, at_s in list(self._used_s.items()) if at_s > since_s}
-
-    def _look_up(self, pairs: Dict[Tuple[str, str], float]) -> None:
+    def _look_up(self, pairs: Set[Tuple[str, str]]) -> None:
         """Hear transforms until all are known, at most for `PATIENCE_S`."""
         clock = rospy.Subscriber("/clock", Clock, ClockSource())
         transforms = Transforms(range(self._robots))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from typing import Any, Callable, Dict, FrozenSet, List, Mapping, Optional, Protocol
+from functools import partial
+from typing import Any, Callable, Dict, FrozenSet, List, Mapping, Optional, Union
 
 import numpy as np
 from map_msgs.msg import OccupancyGridUpdate
@@ -31,120 +32,46 @@ _PLANNERS = {"plan": "base_global_planner", "local_plan": "base_local_planner"}
 _TOPICS = ("scan", "plan", "local_plan", "track", *OF_ONE_ROBOT)
 _GridMessage, _UpdateMessage = numpy_msg(OccupancyGrid), numpy_msg(OccupancyGridUpdate)
 
-Tree = Mapping[str, Any]
 
+class MessageIntake:
+    """Receives one layer of one robot.
 
-class Intake(Protocol):
-    """Receives one layer of one robot."""
+    Attributes:
+        topics: The topics to subscribe to.
+    """
 
-    def topics(self) -> Dict[str, Topic]:
-        """Return the topics to subscribe to."""
-
-    def item(self) -> Optional[Item]:
-        """Return the item if it is new; raises `ValueError` for a message that is not valid."""
-
-
-class ScanIntake:
-    """Scans of a robot's LIDAR."""
-
-    def __init__(self, robot: int, bodies: Bodies, frames: Frames) -> None:
-        """Receive `/scan{i}`."""
-        self._robot, self._bodies, self._frames = robot, bodies, frames
-        self._newest = Newest(f"/scan{robot}", LaserScan)
-
-    def topics(self) -> Dict[str, Topic]:
-        """Return the topic."""
-        return {f"/scan{self._robot}": self._newest.topic}
+    def __init__(
+        self, topic: str, message_type: Any, make: Callable[[bytes], Optional[Item]]
+    ) -> None:
+        """Make an item of a message's bytes; ``make`` raises `ValueError` for a faulty one."""
+        self._newest, self._make = Newest(topic, message_type), make
+        self.topics = {topic: self._newest.topic}
 
     def item(self) -> Optional[Item]:
-        """Return the newest scan's hit points where the robot was at its time."""
+        """Return the item if it is new."""
         data = self._newest.take_bytes()
-        if data is None:
-            return None
-        message = decoded(ScanMessage, data)
-        scan = scan_from_message(message)
-        problem = scan_problem(scan)
-        if problem:
-            raise ValueError(problem)
-        map_from_base = self._bodies.at(self._robot, scan.stamp_s)
-        base_from_lidar = self._frames.find(f"base_link{self._robot}", message.header.frame_id)
-        if map_from_base is None or base_from_lidar is None:
-            return None
-        return scan_item(self._robot, scan, map_from_base.compose(base_from_lidar))
-
-
-class PlanIntake:
-    """Global or local plans of a robot."""
-
-    def __init__(self, layer: str, robot: int, planner: str, frames: Frames) -> None:
-        """Receive the plans of a planner, named as its topic's namespace."""
-        self._layer, self._robot, self._frames = layer, robot, frames
-        self._name = f"/move_base{robot}/{planner}/{layer}"
-        self._newest = Newest(self._name, Path)
-
-    def topics(self) -> Dict[str, Topic]:
-        """Return the topic."""
-        return {self._name: self._newest.topic}
-
-    def item(self) -> Optional[Item]:
-        """Return the newest plan."""
-        data = self._newest.take_bytes()
-        if data is None:
-            return None
-        frame, points = read_path(data)
-        problem = path_problem(points)
-        if problem:
-            raise ValueError(problem)
-        map_from_plan = self._frames.find(MAP, frame)
-        if map_from_plan is None:
-            return None
-        return line_item(self._layer, self._robot, map_from_plan.to_2d().transform_points(points))
-
-
-class TrackIntake:
-    """Tracks and suspects of a robot."""
-
-    def __init__(self, robot: int, frames: Frames) -> None:
-        """Receive `moving_obstacle_tracks`."""
-        self._robot, self._frames = robot, frames
-        self._name = f"/move_base{robot}/{TRACKS_TOPIC}"
-        self._newest = Newest(self._name, MovingObstacles)
-
-    def topics(self) -> Dict[str, Topic]:
-        """Return the topic."""
-        return {self._name: self._newest.topic}
-
-    def item(self) -> Optional[Item]:
-        """Return the newest tracks; none once the last one has ended."""
-        message = self._newest.take()
-        if message is None:
-            return None
-        rows = rows_of_message(message)
-        map_from_frame = self._frames.find(MAP, message.header.frame_id)
-        if map_from_frame is None:
-            return None
-        return track_item(self._robot, rows, map_from_frame.to_2d())
+        return None if data is None else self._make(data)
 
 
 class CostmapIntake:
-    """A costmap of a robot, from its grid and the updates of parts of it."""
+    """Receives a costmap of a robot, its grid and the updates of parts of it.
+
+    Attributes:
+        topics: The topics to subscribe to.
+    """
 
     def __init__(self, layer: str, robot: int, frames: Frames) -> None:
-        """Receive the grid and its updates."""
         self._layer, self._robot, self._frames = layer, robot, frames
         self._name = f"/move_base{robot}/{layer}/costmap"
+        self.topics = {
+            self._name: Topic(raw_type(OccupancyGrid), self._on_grid),
+            f"{self._name}_updates": Topic(raw_type(OccupancyGridUpdate), self._on_update),
+        }
         self._spec: Optional[GridSpec] = None
         self._frame = MAP
         self._costs: NDArray[np.int8] = np.zeros((0, 0), np.int8)
         self._has_changed, self._next_s = False, 0.0
         self._warnings = ThrottledWarnings()
-
-    def topics(self) -> Dict[str, Topic]:
-        """Return both topics."""
-        return {
-            self._name: Topic(raw_type(OccupancyGrid), self._on_grid),
-            f"{self._name}_updates": Topic(raw_type(OccupancyGridUpdate), self._on_update),
-        }
 
     def _on_grid(self, raw: Any) -> None:
         try:
@@ -193,48 +120,67 @@ class Layers:
     """The layers that clients show, of all robots."""
 
     def __init__(
-        self, robots: int, bodies: Bodies, frames: Frames, tree_of: Callable[[int], Tree]
+        self, bodies: Bodies, frames: Frames, tree_of: Callable[[int], Mapping[str, Any]]
     ) -> None:
-        """Start without clients.
-
-        Args:
-            robots: Number of robots.
-            bodies: Their poses.
-            frames: Transforms.
-            tree_of: Returns the parameters of a robot's navigator, {} if they are unknown.
-        """
-        self._robots, self._bodies, self._frames = robots, bodies, frames
-        self._tree_of = tree_of
-        self._intakes: Dict[str, Intake] = {}
+        """Receive nothing yet; ``tree_of`` returns a navigator's parameters, {} if unknown."""
+        self._bodies, self._frames, self._tree_of = bodies, frames, tree_of
+        self._intakes: Dict[str, Union[MessageIntake, CostmapIntake]] = {}
         self._warnings = ThrottledWarnings()
 
     def topics(self, shown: Mapping[str, FrozenSet[int]]) -> Dict[str, Topic]:
-        """Return the topics to subscribe to.
-
-        Args:
-            shown: Robots of which clients show a layer, by layer.
-        """
-        wanted = [(layer, robot) for layer in _TOPICS for robot in sorted(shown[layer])]
+        """Return the topics to subscribe to; ``shown`` has the robots of each layer."""
         intakes = {}
-        for layer, robot in wanted:
+        for layer, robot in [(one, i) for one in _TOPICS for i in sorted(shown[one])]:
             key = f"{layer}/{robot}"
             intake = self._intakes.get(key) or self._new(layer, robot)
             if intake is not None:
                 intakes[key] = intake
         self._intakes = intakes
-        return {name: topic for one in intakes.values() for name, topic in one.topics().items()}
+        return {name: topic for one in intakes.values() for name, topic in one.topics.items()}
 
-    def _new(self, layer: str, robot: int) -> Optional[Intake]:
-        if layer == "scan":
-            return ScanIntake(robot, self._bodies, self._frames)
+    def _new(self, layer: str, robot: int) -> Union[MessageIntake, CostmapIntake, None]:
         if layer in OF_ONE_ROBOT:
             return CostmapIntake(layer, robot, self._frames)
+        if layer == "scan":
+            return MessageIntake(f"/scan{robot}", LaserScan, partial(self._scan, robot))
+        node = f"/move_base{robot}"
         if layer == "track":
-            return TrackIntake(robot, self._frames)
+            make = partial(self._track, robot)
+            return MessageIntake(f"{node}/{TRACKS_TOPIC}", MovingObstacles, make)
         planner = self._tree_of(robot).get(_PLANNERS[layer])
         if not isinstance(planner, str):
             return None
-        return PlanIntake(layer, robot, plugin_name(planner), self._frames)
+        make = partial(self._plan, layer, robot)
+        return MessageIntake(f"{node}/{plugin_name(planner)}/{layer}", Path, make)
+
+    def _scan(self, robot: int, data: bytes) -> Optional[Item]:
+        """Return a scan's hit points where the robot was at its time."""
+        message = decoded(ScanMessage, data)
+        scan = scan_from_message(message)
+        problem = scan_problem(scan)
+        if problem:
+            raise ValueError(problem)
+        map_from_base = self._bodies.at(robot, scan.stamp_s)
+        base_from_lidar = self._frames.find(f"base_link{robot}", message.header.frame_id)
+        if map_from_base is None or base_from_lidar is None:
+            return None
+        return scan_item(robot, scan, map_from_base.compose(base_from_lidar))
+
+    def _plan(self, layer: str, robot: int, data: bytes) -> Optional[Item]:
+        frame, points = read_path(data)
+        problem = path_problem(points)
+        if problem:
+            raise ValueError(problem)
+        map_from_plan = self._frames.find(MAP, frame)
+        if map_from_plan is None:
+            return None
+        return line_item(layer, robot, map_from_plan.to_2d().transform_points(points))
+
+    def _track(self, robot: int, data: bytes) -> Optional[Item]:
+        message = decoded(MovingObstacles, data)
+        rows = rows_of_message(message)
+        map_from_frame = self._frames.find(MAP, message.header.frame_id)
+        return None if map_from_frame is None else track_item(robot, rows, map_from_frame.to_2d())
 
     def items(self) -> List[Item]:
         """Return the items that are new."""

@@ -109,11 +109,7 @@ class NavigatorParameters:
     """The dynamic_reconfigure servers of all navigators."""
 
     def __init__(self, trees: NavigatorTrees) -> None:
-        """Start without descriptions.
-
-        Args:
-            trees: Parameters as they were loaded.
-        """
+        """Start without descriptions; ``trees`` has the parameters as they were loaded."""
         self._trees = trees
         self._views: Dict[str, List[ParameterView]] = {}  # by the namespace's full name
         self._lock = threading.Lock()

@@ -53,22 +53,17 @@ class FlightReports:
         contacts: The last contacts.
         recoveries: Number of the last recovery behaviour of each robot's goal, and of all.
         sent_s: Wall time, monotonic, at which each robot's sequencer has sent its last goal.
-        version: Counts changes of scene, radius and trees; `contacts_version` those of contacts.
+        version: Counts changes of scene, radius and trees.
         resets: Counts resets of the simulation.
     """
 
     def __init__(self, robots: int, state: FleetState) -> None:
-        """Start without reports.
-
-        Args:
-            robots: Number of robots.
-            state: Its log of events gets what the nodes log.
-        """
+        """Start without reports; the log of events of ``state`` gets what the nodes log."""
         self.scene: Optional[Scene] = None
         self.radius_m = BODY_RADIUS_M
         self.trees: Dict[int, Mapping[str, Any]] = {}
         self.contacts: List[Contact] = []
-        self.version = self.contacts_version = self.resets = 0
+        self.version = self.resets = 0
         self._robots, self._state = robots, state
         self._failed: Set[Tuple[int, int]] = set()
         self._goals = Newest("/goals", MarkerArray)
@@ -147,7 +142,6 @@ class FlightReports:
             return
         with self._lock:
             self.contacts = [*self.contacts[1 - MAX_CONTACTS :], contact]
-            self.contacts_version += 1
         place = f"({contact.x_m:.2f}, {contact.y_m:.2f}) m"
         text = excerpt(f"CONTACT: {contact} at {place}", MAX_TEXT)
         self._state.add_event(contact.time_s, text, "error", self._robot_of(contact.robot))
@@ -221,20 +215,16 @@ class FlightReports:
             found = _GOAL.fullmatch(marker.ns)
             if not found or int(found[1]) >= self._robots or marker.action != Marker.ADD:
                 continue
-            key, at, turn = (
-                (int(found[1]), marker.id),
-                marker.pose.position,
-                marker.pose.orientation,
-            )
+            key = int(found[1]), marker.id
+            at, turn = marker.pose.position, marker.pose.orientation
             if not (abs(at.x) <= MAX_MAGNITUDE and abs(at.y) <= MAX_MAGNITUDE):
                 continue
             if found[2]:
                 yaws[key] = yaw_from_quaternion((turn.x, turn.y, turn.z, turn.w))
                 continue
             alpha = marker.color.a
-            state = "active" if alpha > _ACTIVE_ALPHA else "pending"
-            if alpha < _REACHED_ALPHA:
-                state = "reached"
+            ended = "reached" if alpha < _REACHED_ALPHA else "pending"
+            state = "active" if alpha > _ACTIVE_ALPHA else ended
             rows.append({"robot": key[0], "index": key[1], "x": at.x, "y": at.y, "state": state})
         return [{**row, "yaw": yaws.get((row["robot"], row["index"]))} for row in rows]
 

@@ -47,13 +47,7 @@ class FlightSource:
     """
 
     def __init__(self, state: FleetState, robots: int, title: str) -> None:
-        """Subscribe to what is rare, and to the rest when there are clients.
-
-        Args:
-            state: Gets the items.
-            robots: Number of robots.
-            title: Name of the flight.
-        """
+        """Subscribe to what is rare, and to the rest when there are clients."""
         self._state, self._title = state, title
         self._names = [f"quad{i}" for i in range(robots)]
         self._frames = Frames(robots)
@@ -61,7 +55,7 @@ class FlightSource:
         self.health = FleetHealth(robots)
         self.reports = FlightReports(robots, state)
         self.trees = NavigatorTrees(self.reports.trees)
-        self._layers = Layers(robots, self.bodies, self._frames, self.trees.tree)
+        self._layers = Layers(self.bodies, self._frames, self.trees.tree)
         self._obstacles = Obstacles()
         self._subscriptions = Subscriptions()
         self._trails = Trails()
@@ -121,7 +115,7 @@ class FlightSource:
         """Remove what would be old when another client comes."""
         gone = {f"trail/{i}" for i in range(len(self._names))} | self._passing
         gone |= {"poses", "obstacles", "status", "yields", "samples", "diagnostics"}
-        self._state.remove(*gone)
+        self._state.put_all([], tuple(gone))
         self._passing = frozenset()
         self._seen.pop("yields", None)
 
@@ -171,12 +165,8 @@ class FlightSource:
         scene = self.reports.scene
         if scene is None:
             return []
-        positions = self.bodies.positions
-        return [
-            item
-            for i in robots
-            for item in cell_items(scene, positions, self.trees.safety_radius_m(i), [i])
-        ]
+        radii_m = {i: self.trees.safety_radius_m(i) for i in robots}
+        return cell_items(scene, self.bodies.positions, radii_m)
 
     def _gone(self, shown: Shown) -> Set[str]:
         """Return the keys of layers that no page shows, or that a robot no longer has."""
@@ -198,24 +188,17 @@ class FlightSource:
         samples = rows.samples_item(
             stamp_s,
             poses,
-            self.health.cycles_s(),
             reports.radius_m,
             reports.scene,
             self._obstacles.solids(),
+            self.health.cycles_s(),
         )
-        values = samples.arrays["values"].tolist()
         goals = self._goal_rows()
         active = {row["robot"]: row for row in goals if row["state"] == "active"}
-        status = [self._status_row(i, values[i], active.get(i)) for i in range(len(self._names))]
-        rights = [reports.right_of_way(i) for i in range(len(self._names))]
+        now = {i: self._robot_now(i, active.get(i)) for i in range(len(self._names))}
+        status, yields = rows.fleet_items(now, self._names, samples)
         seldom = [
-            rows.yields_item(
-                [
-                    row
-                    for i, right in enumerate(rights)
-                    for row in rows.yield_rows(i, right.decision, right.limited_by, self._names)
-                ]
-            ),
+            yields,
             rows.goals_item(goals),
             rows.contacts_item(reports.contacts, self._names),
         ]
@@ -225,16 +208,15 @@ class FlightSource:
             seldom += [scene_item(reports.scene)] if reports.scene is not None else []
         changed = [item for item in seldom if self._seen.get(item.key) != item.data]
         self._seen.update({item.key: item.data for item in changed})
-        return [self._flight_item(), rows.status_item(status), samples, *changed]
+        return [self._flight_item(), status, samples, *changed]
 
     def _goal_rows(self) -> List[Dict[str, Any]]:
         """Return the goals of the mission, and after them those that people have sent."""
         goals = self.reports.goal_rows()
         for robot, (settled_s, pose) in list(self._sent.items()):
-            is_over = self.health.navigator(robot)[0] == "idle"
-            if self.reports.sent_s.get(robot, 0.0) > settled_s - _SETTLES_S or (
-                is_over and time.monotonic() > settled_s
-            ):
+            has_settled = time.monotonic() > settled_s
+            is_over = has_settled and self.health.navigator(robot)[0] == "idle"
+            if is_over or self.reports.sent_s.get(robot, 0.0) > settled_s - _SETTLES_S:
                 self.show_goal(robot, None)
                 continue
             index = sum(row["robot"] == robot for row in goals)
@@ -242,36 +224,31 @@ class FlightSource:
             goals.append({"robot": robot, "index": index, **place, "state": "active"})
         return goals
 
-    def _status_row(
-        self, robot: int, sample: Sequence[float], goal: Optional[Mapping[str, Any]]
-    ) -> Dict[str, Any]:
-        """Return a robot's row; ``goal`` is the row of its active goal."""
+    def _robot_now(self, robot: int, goal: Optional[Mapping[str, Any]]) -> rows.RobotNow:
+        """Return what is known of a robot; ``goal`` is the row of its active goal."""
         navigator, silent_s, reason = self.health.navigator(robot)
         pose_age_s = float(self.bodies.ages_s()[robot])
         progress = self.health.progress(robot)
-        lost = self._lost_reason(pose_age_s, silent_s)
-        is_stopped = bool(reason) or progress.is_stopped
+        is_stopped, lost = bool(reason) or progress.is_stopped, ""
+        if silent_s > LOST_AFTER_S:
+            lost = f"no message of its navigator for {silent_s:.0f} s"
+        elif pose_age_s > LOST_AFTER_S and math.isfinite(pose_age_s):
+            lost = f"no pose for {pose_age_s:.0f} s"
         if lost:
             self.reports.forget_navigator(robot)
         elif progress.is_stopped and not reason:
             reason = "stopped by a person; start resumes its mission"
-        speed_mps = sample[2] if math.isfinite(sample[2]) else 0.0
-        state = rows.robot_state(
+        right = self.reports.right_of_way(robot)
+        return rows.RobotNow(
             navigator or "idle",
-            speed_mps,
-            yielding=self.reports.right_of_way(robot).decision,
+            right.decision,
+            right.limited_by,
             is_done=progress.is_done,
             is_stopped=is_stopped,
             is_lost=bool(lost),
-        )
-        return rows.status_row(
-            robot,
-            state,
             goal=progress.goal,
             goals=progress.goals,
             said={"goal_distance": self._distance_m(robot, goal), **self.reports.columns(robot)},
-            speed_mps=speed_mps,
-            gap_m=sample[0],
             recoveries=self.reports.recoveries.get(robot, (0, self.trees.recoveries(robot))),
             age_s=silent_s if silent_s > LOST_AFTER_S else pose_age_s,
             lidar=self.health.has_lidar(robot),
@@ -284,13 +261,6 @@ class FlightSource:
             return math.nan
         x_m, y_m = self.bodies.positions[robot].tolist()
         return goal_distance_m(Pose2D(goal["x"], goal["y"]), Pose2D(x_m, y_m))
-
-    def _lost_reason(self, pose_age_s: float, silent_s: float) -> str:
-        if silent_s > LOST_AFTER_S:
-            return f"no message of its navigator for {silent_s:.0f} s"
-        if pose_age_s > LOST_AFTER_S and math.isfinite(pose_age_s):
-            return f"no pose for {pose_age_s:.0f} s"
-        return ""
 
     def _flight_item(self) -> Item:
         rate, wanted_rate = self.health.rates

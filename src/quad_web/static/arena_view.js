@@ -6,7 +6,7 @@ import { EditTool } from "./edit_tool.js";
 import { fleetOf, LARGE_FLEET, OF_ONE_ROBOT, solidAt, STREAMED_LAYERS } from "./fleet.js";
 import { Gestures } from "./gestures.js";
 import { Hud, LinkNotice } from "./hud.js";
-import { make } from "./dom.js";
+import { make, say } from "./dom.js";
 import { sharedLink } from "./link.js";
 import { MapView } from "./map_view.js";
 import { GoalTool, ViewTool } from "./tools.js";
@@ -15,12 +15,8 @@ const PAN_PX = 60;
 const PANS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /** The arena in an element of the page. */
-export class ArenaView {
-  /**
-   * @param {HTMLElement} root
-   * @param {(name: string, value: any) => void} emit Tells Python: select, goal, edit, tool, mode,
-   *   link.
-   */
+export class View {
+  /** `emit` tells Python: select, goal, edit, tool, mode, follow. */
   constructor(root, emit) {
     this.emit = emit;
     this.editing = null;
@@ -69,14 +65,7 @@ export class ArenaView {
     };
     document.addEventListener("keydown", this._onEscape, { capture: true });
     this._onFrame = () => this._draw();
-    this._onState = ({ detail: { isAlive } }) => {
-      if (isAlive !== this._wasAlive) {
-        this._wasAlive = isAlive;
-        this.emit("link", isAlive);
-      }
-    };
     this._link.addEventListener("frame", this._onFrame);
-    this._link.addEventListener("state", this._onState);
     this._onVisible = () => this.requestDraw();
     document.addEventListener("visibilitychange", this._onVisible);
     this._resizes = new ResizeObserver(() => this._resize());
@@ -90,18 +79,12 @@ export class ArenaView {
     document.removeEventListener("keydown", this._onEscape, { capture: true });
     document.removeEventListener("visibilitychange", this._onVisible);
     this._link.removeEventListener("frame", this._onFrame);
-    this._link.removeEventListener("state", this._onState);
     for (const view of Object.values(this._views)) {
       view.dispose?.();
     }
   }
 
-  /**
-   * Take over what Python has set.
-   *
-   * @param {{role?: string, selected?: ?number, layers?: string[], mode?: string, tool?: string,
-   *   editing?: ?object, following?: boolean}} state
-   */
+  /** Take over what Python has set, see class `Arena` in `arena.py`. */
   apply(state) {
     if (state.role !== undefined) {
       this._role = state.role;
@@ -113,15 +96,15 @@ export class ArenaView {
     }
     if (state.selected !== undefined) {
       this._choices.selected = state.selected;
-      this._hud.hideNote();
+      this._hud.note("");
     }
     if (state.editing !== undefined) {
       this.editing = state.editing && { faults: [], ...state.editing };
     }
     if (state.tool !== undefined) {
-      this._setTool(this._role === "steer" ? state.tool : "view");
+      this._setTool(this._role === "steer" && this._tools[state.tool] ? state.tool : "view");
     }
-    if (state.mode !== undefined && state.mode !== this._mode) {
+    if (["2d", "3d"].includes(state.mode) && state.mode !== this._mode) {
       this._setMode(state.mode);
     }
     if (state.following !== undefined) {
@@ -142,7 +125,7 @@ export class ArenaView {
   _updateLegend() {
     const ofView = this._mode === "2d" ? ["map"] : [];
     const ofScene = this._hasMoving ? ["moving"] : [];
-    this._hud.setLayers(new Set([...this._choices.layers, ...ofView, ...ofScene]));
+    this._hud.legend.setLayers(new Set([...this._choices.layers, ...ofView, ...ofScene]));
   }
 
   /** Select a robot (null: none) as the person has clicked it. */
@@ -321,14 +304,14 @@ export class ArenaView {
 
   _hovered(place) {
     if (!place || !Number.isFinite(place.x)) {
-      this._hud.setPlace("");
+      say(this._hud.place, "");
       return;
     }
     const solid = solidAt(this.fleet, place.x, place.y);
     const top = solid && solid.bottom + solid.height;
     const span = solid && `${solid.bottom.toFixed(1)} to ${top.toFixed(1)} m high`;
     const there = solid ? `  ${solid.name}, ${span}` : "";
-    this._hud.setPlace(`x ${place.x.toFixed(2)}  y ${place.y.toFixed(2)} m${there}`);
+    say(this._hud.place, `x ${place.x.toFixed(2)}  y ${place.y.toFixed(2)} m${there}`);
   }
 
   _key(event) {

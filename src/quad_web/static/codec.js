@@ -18,13 +18,7 @@ const TYPES = {
  * @typedef {{key: string, data: any, arrays: Object<string, NumberArray>}} Item
  */
 
-/**
- * Decode a message.
- *
- * @param {ArrayBuffer} buffer The message.
- * @returns {Promise<{header: any, items: Item[], removed: string[]}>}
- * @throws {Error} An array has an unknown type or the wrong number of values.
- */
+/** Decode an ArrayBuffer to `{header, items, removed}`; throws if it is no message. */
 export async function decode(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));

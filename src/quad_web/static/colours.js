@@ -87,12 +87,7 @@ const COST_TABLE = Uint32Array.from({ length: 256 }, (_, byte) => {
   return ((alpha << 24) | (blue << 16) | (green << 8) | red) >>> 0;
 });
 
-/**
- * Paint the costs of a costmap onto a canvas, one pixel for each cell, first row at the top.
- *
- * @param {HTMLCanvasElement} canvas
- * @param {{values: Int8Array, shape: number[]}} costs
- */
+/** Paint a costmap onto a canvas, one pixel for each cell, first row at the top. */
 export function paintCosts(canvas, { values, shape: [rows, columns] }) {
   if (canvas.width !== columns || canvas.height !== rows) {
     canvas.width = columns;

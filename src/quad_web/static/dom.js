@@ -2,14 +2,7 @@
  * Elements of the page, made without markup: whatever they say is text.
  */
 
-/**
- * Make an element.
- *
- * @param {string} tag
- * @param {Object<string, any>} attributes Functions are listeners: `{click: () => ...}`.
- * @param {...(Node|string)} children
- * @returns {HTMLElement}
- */
+/** Make an element; attributes that are functions are listeners: `{click: () => ...}`. */
 export function make(tag, attributes = {}, ...children) {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
@@ -23,13 +16,7 @@ export function make(tag, attributes = {}, ...children) {
   return element;
 }
 
-/**
- * Make a button with an icon of Material Icons, which NiceGUI serves.
- *
- * @param {string} icon Name of the icon.
- * @param {string} label What it does.
- * @param {() => void} action
- */
+/** Make a button with an icon of Material Icons, which NiceGUI serves. */
 export function iconButton(icon, label, action) {
   return make(
     "button",

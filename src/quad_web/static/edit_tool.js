@@ -5,7 +5,7 @@
 
 import { INK, mix, textOn, withAlpha } from "./colours.js";
 import { added, moved, removed, shifted, turned } from "./goal_list.js";
-import { disc, drawArrow, tag, write } from "./map_marks.js";
+import { ahead, disc, drawArrow, drawDashes, tag, write } from "./map_marks.js";
 import { ViewTool } from "./tools.js";
 import { nearest } from "./viewport.js";
 
@@ -177,7 +177,7 @@ export class EditTool extends ViewTool {
     }
     const colour = fleet.editing?.colour ?? INK.accent;
     const places = editing.goals.map(({ x, y }) => view.toScreen(x, y));
-    drawRoute(context, places, colour);
+    drawDashes(context, places, [2, 5], colour, 2);
     editing.goals.forEach((goal, i) => {
       const look = { colour, isCurrent: i === this._current, fault: editing.faults[i] ?? "" };
       drawEdited(context, view, goal, i, places[i], look);
@@ -185,23 +185,7 @@ export class EditTool extends ViewTool {
   }
 }
 
-function handleOf(view, { x, y, yaw }) {
-  const [px, py] = view.toScreen(x, y);
-  const angle = yaw ?? 0;
-  const [qx, qy] = view.toScreen(x + 0.1 * Math.cos(angle), y + 0.1 * Math.sin(angle));
-  const length = Math.hypot(qx - px, qy - py) || 1;
-  return [px + (HANDLE_PX * (qx - px)) / length, py + (HANDLE_PX * (qy - py)) / length];
-}
-
-function drawRoute(context, places, colour) {
-  context.beginPath();
-  places.forEach((place, i) => (i ? context.lineTo(...place) : context.moveTo(...place)));
-  context.setLineDash([2, 5]);
-  context.lineWidth = 2;
-  context.strokeStyle = colour;
-  context.stroke();
-  context.setLineDash([]);
-}
+const handleOf = (view, goal) => ahead((x, y) => view.toScreen(x, y), goal, HANDLE_PX);
 
 function drawEdited(context, view, goal, index, at, { colour, isCurrent, fault }) {
   const ink = fault ? INK.fault : colour;

@@ -46,12 +46,7 @@ const DEFAULT_RADIUS_M = 0.3;
  * @property {?{robot: number, goals: object[], faults: string[]}} editing Goals being edited.
  */
 
-/**
- * Return what is there to draw.
- *
- * @param {import("./store.js").Store} store
- * @param {Choices} choices
- */
+/** Return what is there to draw: a store and choices as one plain object. */
 export function fleetOf(store, choices) {
   const scene = store.get("scene")?.data ?? null;
   const looks = store.get("robots")?.data ?? { colours: [], names: [], radius_m: DEFAULT_RADIUS_M };
@@ -69,7 +64,7 @@ export function fleetOf(store, choices) {
       : [];
   return {
     scene,
-    sceneRevision: store.revision("scene"),
+    sceneRevision: store.get("scene")?.revision ?? 0,
     obstacles: obstaclesOf(store, scene),
     altitude: scene?.altitude_m ?? 1,
     selected: robots.get(choices.selected) ?? null,
@@ -105,14 +100,8 @@ function robotsOf(store, looks) {
         name: looks.names[index] ?? String(index),
         colour: looks.colours[index] ?? INK.limited,
         radius: looks.radius_m || DEFAULT_RADIUS_M,
-        footprint: looks.footprint ?? null,
         state: rows.get(index)?.state ?? "",
-        x,
-        y,
-        z,
-        roll,
-        pitch,
-        yaw,
+        ...{ x, y, z, roll, pitch, yaw },
       });
     }
   }

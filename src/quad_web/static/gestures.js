@@ -23,11 +23,7 @@ const WHEEL_FACTOR = 0.0015; // of the logarithm of the scale, for each pixel of
 
 /** Watches an element, drives the tool, and moves the view. */
 export class Gestures {
-  /**
-   * @param {HTMLElement} element
-   * @param {{tool: () => Tool, view: () => object, moved: () => void,
-   *   hovered: (place: ?Place) => void}} host `moved` is called when the view has moved.
-   */
+  /** The host has `tool()`, `view()`, `moved()` when the view has, and `hovered(place)`. */
   constructor(element, host) {
     this._element = element;
     this._host = host;

@@ -17,16 +17,12 @@ const REFUSED =
 
 /** The elements over the arena. */
 export class Hud {
-  /**
-   * @param {HTMLElement} root
-   * @param {{fit: () => void, zoom: (factor: number) => void, follow: () => void,
-   *   leave: () => void, covered: () => void}} actions `covered`: panels cover another part.
-   */
+  /** Actions are fit, zoom, follow, leave, and covered: panels cover another part. */
   constructor(root, actions) {
     this._root = root;
     this._follow = iconButton("my_location", "Follow the selected robot", actions.follow);
     this._legendButton = iconButton("help_outline", "Legend", () => this._toggleLegend());
-    this._legend = new Legend();
+    this.legend = new Legend();
     this._buttons = make(
       "div",
       { class: "quad-buttons", role: "toolbar", "aria-label": "View" },
@@ -38,7 +34,7 @@ export class Hud {
     );
     this._bar = make("div", { class: "quad-scale-bar" });
     this._barText = make("span");
-    this._place = make("div", { class: "quad-place" });
+    this.place = make("div", { class: "quad-place" });
     this._hintText = make("span");
     this._hint = make(
       "div",
@@ -54,9 +50,9 @@ export class Hud {
         "div",
         { class: "quad-foot" },
         make("div", { class: "quad-scale" }, this._bar, this._barText),
-        this._place,
+        this.place,
       ),
-      this._legend.element,
+      this.legend.element,
       this._hint,
       this._note,
       this._menu,
@@ -68,24 +64,19 @@ export class Hud {
   }
 
   _toggleLegend() {
-    const isOpen = this._legend.toggle();
+    const isOpen = this.legend.toggle();
     this._legendButton.setAttribute("aria-pressed", String(isOpen));
     this._covers?.();
   }
 
   /** Pixels that panels cover on each side. */
   get covered() {
-    const legend = this._legend.element;
+    const legend = this.legend.element;
     return {
       left: legend.hidden ? 0 : legend.offsetLeft + legend.offsetWidth + 8,
       right: this._buttons.offsetWidth + 18,
       top: this._root.clientWidth < WIDE_PX ? TOOLBAR_PX : 0, // else it is beside the arena
     };
-  }
-
-  /** Show what the shown layers are. */
-  setLayers(layers) {
-    this._legend.setLayers(layers);
   }
 
   /** Show how long a length is; null where it depends on the distance. */
@@ -98,11 +89,6 @@ export class Hud {
     this._bar.parentElement.hidden = false;
     this._bar.style.width = `${Math.round(metres / metresPerPixel)}px`;
     say(this._barText, formatLength(metres));
-  }
-
-  /** Show the coordinates under the pointer and what is there. */
-  setPlace(text) {
-    say(this._place, text);
   }
 
   /** Show whether the selected robot is followed, and whether one is selected. */
@@ -120,25 +106,14 @@ export class Hud {
   /** Show a sentence for some seconds. */
   note(text) {
     say(this._note, text);
-    this._note.hidden = false;
+    this._note.hidden = !text;
     clearTimeout(this._noteTimer);
     this._noteTimer = setTimeout(() => {
       this._note.hidden = true;
     }, NOTE_MS);
   }
 
-  /** Hide the sentence. */
-  hideNote() {
-    this._note.hidden = true;
-  }
-
-  /**
-   * Show a menu at a place until something else is pressed.
-   *
-   * @param {{px: number, py: number}} place
-   * @param {string} title
-   * @param {[string, () => void, boolean][]} entries Text, action, and whether it is possible.
-   */
+  /** Show a menu of [text, action, whether it is possible] until something else is pressed. */
   showMenu({ px, py }, title, entries) {
     const items = entries.map(([text, action, isPossible]) => {
       const act = () => {

@@ -5,11 +5,17 @@
 import { costColour, INK, mix } from "./colours.js";
 import { make } from "./dom.js";
 import { YIELD_COLOURS } from "./fleet.js";
-import { drawArrow, drawContacts, drawCross, drawGoal, GOAL_SIZES } from "./map_marks.js";
+import {
+  drawArrow,
+  drawContacts,
+  drawCross,
+  drawGoal,
+  drawTracks,
+  GOAL_SIZES,
+} from "./map_marks.js";
 import { drawPaths, drawScans } from "./map_paths.js";
 import { drawRobot } from "./map_robots.js";
 import { drawObstacles, drawSolids } from "./map_scene.js";
-import { drawTracks } from "./map_tracks.js";
 import { Viewport } from "./viewport.js";
 
 const WIDTH = 40;
@@ -85,7 +91,7 @@ function moving(shape) {
 function track(kind) {
   return (context) => {
     const motion = kind === "suspect" ? { x: 0, vx: 0 } : { x: -6, vx: 20 };
-    drawTracks(context, viewport(), [{ y: 0, vy: 0, radius: 8, colour: COLOUR, kind, ...motion }]);
+    drawTracks(context, toScreen, [{ y: 0, vy: 0, radius: 8, colour: COLOUR, kind, ...motion }]);
   };
 }
 

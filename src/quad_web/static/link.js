@@ -20,9 +20,8 @@ const FORBIDDEN = 403;
 /**
  * A connection that comes back by itself.
  *
- * Events: `frame` after the items of a message are in the store (listeners draw), `drawn` after
- * that (detail: `{seq, wall_s, latency_s}`), `state` when the link dies, stays dead for another
- * while, or comes back (detail: `{isAlive, silence_s}`).
+ * Events: `frame` after the items of a message are in the store (listeners draw), `state` when the
+ * link dies, stays dead for another while, or comes back.
  *
  * `isRefused` is true while the server answers, but refuses this page: after a restart it has other
  * tokens, unless they were given.
@@ -43,13 +42,7 @@ export class Link extends EventTarget {
     setInterval(() => this._check(), CHECK_MS);
   }
 
-  /**
-   * Ask for layers; those of one robot only are sent for the selected one.
-   *
-   * @param {string[]} layers Names as in `view/state.py` LAYERS.
-   * @param {?number} robot Number of the selected robot.
-   * @param {boolean} every False for LIDAR points and local plans of the selected robot only.
-   */
+  /** Ask for layers; `every` is false for costly ones of the selected robot only. */
   want(layers, robot, every) {
     const wanted = { layers: [...layers].sort(), robot, every };
     if (JSON.stringify(wanted) !== JSON.stringify(this._wanted)) {
@@ -126,12 +119,7 @@ export class Link extends EventTarget {
       await nextFrame();
       this.dispatchEvent(new CustomEvent("frame"));
     }
-    if (header.seq !== undefined) {
-      this._send({ ack: header.seq });
-    }
-    const latency_s = Date.now() / 1000 - header.wall_s;
-    const detail = { seq: header.seq, wall_s: header.wall_s, latency_s };
-    this.dispatchEvent(new CustomEvent("drawn", { detail }));
+    this._send({ ack: header.seq });
   }
 
   _check() {
@@ -168,8 +156,7 @@ export class Link extends EventTarget {
     }
     this.isAlive = isAlive;
     this.isRefused = this.isRefused && !isAlive;
-    const detail = { isAlive, silence_s: this.silence_s };
-    this.dispatchEvent(new CustomEvent("state", { detail }));
+    this.dispatchEvent(new CustomEvent("state"));
   }
 }
 

@@ -40,7 +40,7 @@ export default {
             :class="'cell-' + column.kind" :title="hint(column, props.row)">
             <template v-if="column.kind === 'robot'"><span v-if="props.row.colour" class="dot"
               :style="{ background: props.row.colour }"></span>{{ shownText(column, props.row) }}</template>
-            <span v-else-if="column.kind === 'state'" class="state" :data-state="column.value">{{
+            <span v-else-if="column.kind === 'state'" class="chip state" :data-state="column.value">{{
               column.value }}</span>
             <span v-else-if="column.kind === 'level'" class="level" :data-level="column.value">{{
               column.value }}</span>

@@ -1,15 +1,27 @@
 /**
- * Marks at places in the arena: goals, yields and contacts. Both views draw them with a function
- * that gives the pixels of a place.
+ * Marks at places in the arena: goals, tracks, yields and contacts. Both views draw them with a
+ * function that gives the pixels of a place.
  *
  * @typedef {(x: number, y: number) => [number, number]} ToScreen
  */
 
 import { INK, mix, textOn, withAlpha } from "./colours.js";
+import { tracePath } from "./viewport.js";
 
-const FONT = "Roboto, system-ui, sans-serif";
+export const FONT = "Roboto, system-ui, sans-serif";
 
 const FEW_GOALS = 12;
+
+const TRACK_CORNERS = 32;
+const AHEAD_S = 1; // after which a tracked obstacle is at the end of its line
+const SLOWEST_MPS = 0.05; // slower ones have no line
+
+/** Fill, opacity of the ring, and dashes, by kind. */
+const TRACK_LOOKS = {
+  seen: { fill: withAlpha(INK.tracked, 0.3), ring: 1, dash: [] },
+  hidden: { fill: withAlpha(INK.tracked, 0.12), ring: 0.6, dash: [5, 4] },
+  suspect: { fill: withAlpha(INK.suspect, 0.35), ring: 0.7, dash: [1.5, 3] },
+};
 
 /** Radius of goals and size of their numbers (0: none), for so many pixels between goals. */
 export const GOAL_SIZES = [
@@ -18,14 +30,7 @@ export const GOAL_SIZES = [
   { from: 0, radius: 4, font: 0 },
 ];
 
-/**
- * Draw goals: numbered discs, the active one larger, with an arrow for the yaw.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {ToScreen} toScreen
- * @param {object[]} goals As in `fleet.js`.
- * @param {boolean} hasSelection Whether a robot is selected; the goals of the others are faint.
- */
+/** Draw goals; if a robot is selected, those of the others are faint. */
 export function drawGoals(context, toScreen, goals, hasSelection) {
   drawOrder(context, toScreen, goals.filter((goal) => goal.isOfSelected));
   const size = sizeFor(goals.map(({ x, y }) => toScreen(x, y)));
@@ -50,42 +55,34 @@ function drawOrder(context, toScreen, goals) {
   if (goals.length < 2) {
     return;
   }
-  context.beginPath();
-  goals.forEach((goal, i) => {
-    const place = toScreen(goal.x, goal.y);
-    i ? context.lineTo(...place) : context.moveTo(...place);
-  });
-  context.setLineDash([2, 5]);
-  context.lineWidth = 1.5;
-  context.strokeStyle = withAlpha(goals[0].colour, 0.8);
+  const places = goals.map(({ x, y }) => toScreen(x, y));
+  drawDashes(context, places, [2, 5], withAlpha(goals[0].colour, 0.8), 1.5);
+}
+
+/** Draw a dashed line through places in pixels. */
+export function drawDashes(context, places, dash, colour, width) {
+  tracePath(context, places);
+  context.setLineDash(dash);
+  context.lineWidth = width;
+  context.strokeStyle = colour;
   context.stroke();
   context.setLineDash([]);
 }
 
-/**
- * Draw one goal.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {ToScreen} toScreen
- * @param {object} goal As in `fleet.js`.
- * @param {{radius: number, font: number}} size One of `GOAL_SIZES`.
- * @param {boolean} isFaint
- */
+/** Draw one goal, a numbered disc with an arrow for the yaw; `size` is one of `GOAL_SIZES`. */
 export function drawGoal(context, toScreen, goal, size, isFaint) {
   const [px, py] = toScreen(goal.x, goal.y);
   const isActive = goal.state === "active";
   const radius = size.radius + (isActive && size.font ? 2 : 0);
   context.globalAlpha = (goal.state === "reached" ? 0.4 : 1) * (isFaint ? 0.55 : 1);
   if (goal.yaw !== null && size.font) {
-    drawYaw(context, toScreen, goal, radius, goal.colour);
+    const tip = ahead(toScreen, goal, radius + 14);
+    drawArrow(context, [px, py], tip, goal.colour, 2.5);
   }
   const edge = size.font ? 2 : 1.5;
   disc(context, px, py, radius, isActive ? goal.colour : "#ffffff", goal.colour, edge);
   if (isActive) {
-    context.beginPath();
-    context.arc(px, py, radius + 3, 0, 2 * Math.PI);
-    context.lineWidth = 1.5;
-    context.stroke();
+    disc(context, px, py, radius + 3, "transparent", goal.colour, 1.5);
   }
   if (size.font) {
     const ink = isActive ? textOn(goal.colour) : mix(goal.colour, "#000000", 0.35);
@@ -97,14 +94,12 @@ export function drawGoal(context, toScreen, goal, size, isFaint) {
   context.globalAlpha = 1;
 }
 
-/** Draw an arrow from a disc's edge into the direction of a yaw. */
-export function drawYaw(context, toScreen, { x, y, yaw }, radius, colour) {
+/** Return the place that is so many pixels ahead of a goal; any yaw is east. */
+export function ahead(toScreen, { x, y, yaw }, distance) {
   const [px, py] = toScreen(x, y);
-  const [qx, qy] = toScreen(x + 0.1 * Math.cos(yaw), y + 0.1 * Math.sin(yaw));
-  const length = Math.hypot(qx - px, qy - py) || 1;
-  const [ux, uy] = [(qx - px) / length, (qy - py) / length];
-  const tip = radius + 14;
-  drawArrow(context, [px, py], [px + ux * tip, py + uy * tip], colour, 2.5);
+  const [qx, qy] = toScreen(x + 0.1 * Math.cos(yaw ?? 0), y + 0.1 * Math.sin(yaw ?? 0));
+  const share = distance / (Math.hypot(qx - px, qy - py) || 1);
+  return [px + share * (qx - px), py + share * (qy - py)];
 }
 
 /** Draw an arrow between two places in pixels. */
@@ -127,14 +122,7 @@ export function drawArrow(context, [ax, ay], [bx, by], colour, width = 2) {
   context.fill();
 }
 
-/**
- * Draw who yields to whom, and where a robot that makes room will hold.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {ToScreen} toScreen
- * @param {object[]} yields As in `fleet.js`.
- * @param {(robot: object) => number} radiusOf Radius in pixels that a robot is drawn with.
- */
+/** Draw who yields to whom, and where it will hold; `radiusOf` a robot is in pixels. */
 export function drawYields(context, toScreen, yields, radiusOf) {
   context.lineCap = "butt";
   for (const { robot, peer, kind, hold, colour } of yields) {
@@ -147,14 +135,7 @@ export function drawYields(context, toScreen, yields, radiusOf) {
     }
     if (hold) {
       const place = toScreen(...hold);
-      context.setLineDash([3, 4]);
-      context.beginPath();
-      context.moveTo(...from);
-      context.lineTo(...place);
-      context.lineWidth = 2;
-      context.strokeStyle = colour;
-      context.stroke();
-      context.setLineDash([]);
+      drawDashes(context, [from, place], [3, 4], colour, 2);
       drawCross(context, ...place, 7, colour, 3);
     }
   }
@@ -172,20 +153,35 @@ function shortened([ax, ay], [bx, by], atStart, atEnd) {
   ];
 }
 
+/**
+ * Draw tracks and suspects as rings in the colour of the robot that tracks them, with lines to
+ * where they are in a second.
+ */
+export function drawTracks(context, toScreen, tracks) {
+  for (const { x, y, vx, vy, radius, kind, colour } of tracks) {
+    const { fill, ring, dash } = TRACK_LOOKS[kind];
+    const corners = Array.from({ length: TRACK_CORNERS + 1 }, (_, i) => {
+      const angle = (2 * Math.PI * i) / TRACK_CORNERS;
+      return toScreen(x + radius * Math.cos(angle), y + radius * Math.sin(angle));
+    });
+    drawDashes(context, corners, dash, withAlpha(colour, ring), 2);
+    context.fillStyle = fill;
+    context.fill();
+    if (Math.hypot(vx, vy) >= SLOWEST_MPS) {
+      const ends = [toScreen(x, y), toScreen(x + AHEAD_S * vx, y + AHEAD_S * vy)];
+      drawDashes(context, ends, [], withAlpha(colour, ring), 2);
+    }
+  }
+}
+
 /** Draw contacts; recent ones with their time. */
 export function drawContacts(context, toScreen, contacts) {
   for (const { x, y, time_s, isFresh } of contacts) {
     const [px, py] = toScreen(x, y);
     context.globalAlpha = isFresh ? 1 : 0.45;
-    if (isFresh) {
-      context.beginPath();
-      context.arc(px, py, 11, 0, 2 * Math.PI);
-      context.lineWidth = 2;
-      context.strokeStyle = INK.contact;
-      context.stroke();
-    }
     drawCross(context, px, py, isFresh ? 7 : 5, INK.contact, 2.5);
     if (isFresh) {
+      disc(context, px, py, 11, "transparent", INK.contact);
       tag(context, `${time_s.toFixed(1)} s`, px, py + 20, INK.contact);
     }
   }

@@ -4,33 +4,31 @@
 
 import { INK, mix, textOn, withAlpha } from "./colours.js";
 import { tiltOf } from "./fleet.js";
+import { disc, FONT, write } from "./map_marks.js";
+import { tracePath } from "./viewport.js";
 
 const LEAST_RADIUS_PX = 8;
 const ICON_BELOW_PX = 11; // drawn as a dart instead of with rotors
 const TILT_FROM_PX = 13;
 const FULL_TILT = 0.35; // sine of the tilt that moves the mark to the hull
-const FAULTY = { lost: INK.fault, stopped: INK.fault, recovering: INK.waits };
+export const FAULTY = { lost: INK.fault, stopped: INK.fault, recovering: INK.waits };
+
+const NOSE = [[0.78, 0], [0.34, 0.2], [0.34, -0.2]];
+const DART = [[0.8, 0], [-0.55, 0.55], [-0.25, 0], [-0.55, -0.55]];
 
 /** Return the radius in pixels that a robot is drawn with. */
 export function drawnRadius(robot, scale) {
   return Math.max(robot.radius * scale, LEAST_RADIUS_PX);
 }
 
-/**
- * Draw a quadcopter.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {import("./viewport.js").Viewport} viewport
- * @param {object} robot As in `fleet.js`.
- * @param {boolean} isSelected
- */
+/** Draw a quadcopter. */
 export function drawRobot(context, viewport, robot, isSelected) {
   const [px, py] = viewport.toScreen(robot.x, robot.y);
   const radius = drawnRadius(robot, viewport.scale);
   if (isSelected) {
-    drawHalo(context, px, py, radius);
+    disc(context, px, py, radius + 6, withAlpha(INK.accent, 0.16), INK.accent, 2.5);
   }
-  drawHull(context, viewport, robot, px, py, radius);
+  drawHull(context, robot, px, py, radius);
   context.save();
   context.translate(px, py);
   context.rotate(-robot.yaw);
@@ -41,38 +39,12 @@ export function drawRobot(context, viewport, robot, isSelected) {
   }
 }
 
-function drawHalo(context, px, py, radius) {
-  context.beginPath();
-  context.arc(px, py, radius + 6, 0, 2 * Math.PI);
-  context.fillStyle = withAlpha(INK.accent, 0.16);
-  context.fill();
-  context.lineWidth = 2.5;
-  context.strokeStyle = INK.accent;
-  context.stroke();
-}
-
 /** The hull that collisions are counted with; its colour tells of trouble. */
-function drawHull(context, viewport, robot, px, py, radius) {
+function drawHull(context, robot, px, py, radius) {
   const trouble = FAULTY[robot.state];
-  context.beginPath();
-  if (robot.footprint && radius >= ICON_BELOW_PX) {
-    const [cos, sin] = [Math.cos(robot.yaw), Math.sin(robot.yaw)];
-    robot.footprint.forEach(([u, v], i) => {
-      const corner = viewport.toScreen(
-        robot.x + cos * u - sin * v,
-        robot.y + sin * u + cos * v,
-      );
-      i ? context.lineTo(...corner) : context.moveTo(...corner);
-    });
-    context.closePath();
-  } else {
-    context.arc(px, py, radius + (trouble ? 2 : 0), 0, 2 * Math.PI);
-  }
-  context.fillStyle = withAlpha(trouble ?? robot.colour, trouble ? 0.25 : 0.1);
-  context.fill();
-  context.lineWidth = trouble ? 2.5 : 1;
-  context.strokeStyle = trouble ?? withAlpha(robot.colour, 0.65);
-  context.stroke();
+  const fill = withAlpha(trouble ?? robot.colour, trouble ? 0.25 : 0.1);
+  const edge = trouble ?? withAlpha(robot.colour, 0.65);
+  disc(context, px, py, radius + (trouble ? 2 : 0), fill, edge, trouble ? 2.5 : 1);
 }
 
 /** Four rotors, arms and a body with a white nose, within a circle. */
@@ -89,27 +61,16 @@ function drawAirframe(context, radius, colour) {
   context.moveTo(-arm, arm);
   context.lineTo(arm, -arm);
   context.stroke();
-  context.lineWidth = Math.max(1, 0.06 * radius);
   for (const [x, y] of [[arm, arm], [arm, -arm], [-arm, arm], [-arm, -arm]]) {
-    context.beginPath();
-    context.arc(x, y, rotor, 0, 2 * Math.PI);
-    context.fillStyle = x > 0 ? withAlpha(colour, 0.75) : withAlpha(colour, 0.4);
-    context.fill();
-    context.strokeStyle = dark;
-    context.stroke();
+    const fill = withAlpha(colour, x > 0 ? 0.75 : 0.4);
+    disc(context, x, y, rotor, fill, dark, Math.max(1, 0.06 * radius));
   }
   context.beginPath();
   context.ellipse(0, 0, 0.42 * radius, 0.26 * radius, 0, 0, 2 * Math.PI);
   context.fillStyle = colour;
   context.fill();
   context.stroke();
-  context.beginPath(); // the nose
-  context.moveTo(0.78 * radius, 0);
-  context.lineTo(0.34 * radius, 0.2 * radius);
-  context.lineTo(0.34 * radius, -0.2 * radius);
-  context.closePath();
-  context.fillStyle = "#ffffff";
-  context.fill();
+  fillWhite(context, radius, NOSE);
   context.stroke();
 }
 
@@ -119,11 +80,12 @@ function drawDart(context, radius, colour) {
   context.arc(0, 0, radius, 0, 2 * Math.PI);
   context.fillStyle = colour;
   context.fill();
-  context.beginPath();
-  context.moveTo(0.8 * radius, 0);
-  context.lineTo(-0.55 * radius, 0.55 * radius);
-  context.lineTo(-0.25 * radius, 0);
-  context.lineTo(-0.55 * radius, -0.55 * radius);
+  fillWhite(context, radius, DART);
+}
+
+/** Fill a polygon, whose corners are in radii. */
+function fillWhite(context, radius, corners) {
+  tracePath(context, corners.map(([x, y]) => [x * radius, y * radius]));
   context.closePath();
   context.fillStyle = "#ffffff";
   context.fill();
@@ -142,30 +104,15 @@ function drawTilt(context, robot, px, py, radius) {
   context.moveTo(px, py);
   context.lineTo(px + dx, py + dy);
   context.stroke();
-  context.beginPath();
-  context.arc(px + dx, py + dy, Math.max(2, 0.1 * radius), 0, 2 * Math.PI);
-  context.fillStyle = "#ffffff";
-  context.fill();
-  context.lineWidth = 1;
-  context.strokeStyle = INK.text;
-  context.stroke();
+  disc(context, px + dx, py + dy, Math.max(2, 0.1 * radius), "#ffffff", INK.text, 1);
 }
 
-/**
- * Draw numbers beside robots. The selected one comes first; a number that would cover another one
- * is left out.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {{px: number, py: number, radius: number, index: number, colour: string,
- *   isSelected: boolean}[]} marks Robots in pixels.
- */
+/** Draw numbers beside robots, the selected one first; none covers another one. */
 export function drawNumbers(context, marks) {
   const size = marks.length > 40 ? 10 : 12;
   const height = size + 4;
   const taken = [];
-  context.font = `600 ${size}px Roboto, system-ui, sans-serif`;
-  context.textAlign = "center";
-  context.textBaseline = "middle";
+  context.font = `600 ${size}px ${FONT}`;
   const ordered = [...marks].sort((a, b) => b.isSelected - a.isSelected);
   for (const { px, py, radius, index, colour, isSelected } of ordered) {
     const text = String(index);
@@ -182,8 +129,8 @@ export function drawNumbers(context, marks) {
     context.lineWidth = 1.5;
     context.strokeStyle = "#ffffff";
     context.stroke();
-    context.fillStyle = textOn(isSelected ? INK.accent : colour);
-    context.fillText(text, box[0] + width / 2, box[1] + height / 2 + 0.5);
+    const ink = textOn(isSelected ? INK.accent : colour);
+    write(context, text, box[0] + width / 2, box[1] + height / 2, size, ink);
   }
 }
 

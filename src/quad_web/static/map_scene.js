@@ -5,7 +5,7 @@
 
 import { INK, paintCosts } from "./colours.js";
 import { levelOf, outlineOf } from "./fleet.js";
-import { roundLength } from "./viewport.js";
+import { roundLength, tracePath } from "./viewport.js";
 
 const COSTMAP_OPACITY = 0.55;
 const HATCH_PX = 7;
@@ -16,12 +16,7 @@ const SOLID = { fill: INK.solid, edge: INK.solidEdge, passed: INK.passed };
 const WALL = { ...SOLID, fill: INK.wall };
 const MOVING = { fill: INK.moving, edge: INK.movingEdge, passed: INK.moving };
 
-/**
- * Draw the floor and its grid, as far as it is seen.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {import("./viewport.js").Viewport} viewport
- */
+/** Draw the floor and its grid, as far as it is seen. */
 export function drawFloor(context, viewport, scene) {
   context.fillStyle = INK.background;
   context.fillRect(0, 0, viewport.width, viewport.height);
@@ -86,30 +81,28 @@ export function drawObstacles(context, viewport, obstacles, altitude) {
   }
 }
 
+/** Corners of a triangle that points ahead, in radii of a person. */
+const TIP = [
+  [0.9, 0],
+  [-0.4, 0.5],
+  [-0.4, -0.5],
+];
+
 /** Draw a white triangle that points ahead, into a person. */
-function drawHeading(context, viewport, { x, y, yaw, reach }) {
-  const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
-  const corners = [
-    [0.9, 0],
-    [-0.4, 0.5],
-    [-0.4, -0.5],
-  ];
-  context.beginPath();
-  corners.forEach(([u, v], i) => {
-    const at = [x + reach * (cos * u - sin * v), y + reach * (sin * u + cos * v)];
-    i ? context.lineTo(...viewport.toScreen(...at)) : context.moveTo(...viewport.toScreen(...at));
-  });
-  context.closePath();
+function drawHeading(context, viewport, person) {
+  const outline = TIP.map(([ahead, left]) => [person.reach * ahead, person.reach * left]);
+  traceOutline(context, viewport, { ...person, outline });
   context.fillStyle = "#ffffff";
   context.fill();
 }
 
-function drawSolid(context, viewport, solid, level, look) {
-  context.beginPath();
-  for (const [x, y] of outlineOf(solid)) {
-    context.lineTo(...viewport.toScreen(x, y));
-  }
+function traceOutline(context, viewport, solid) {
+  tracePath(context, outlineOf(solid).map(([x, y]) => viewport.toScreen(x, y)));
   context.closePath();
+}
+
+function drawSolid(context, viewport, solid, level, look) {
+  traceOutline(context, viewport, solid);
   context.setLineDash(level === "high" ? [6, 4] : []);
   if (level !== "high") {
     context.fillStyle = level === "across" ? look.fill : hatch(context);

@@ -3,11 +3,10 @@
  */
 
 import { boundsOf } from "./fleet.js";
-import { drawContacts, drawGoals, drawYields } from "./map_marks.js";
+import { drawContacts, drawGoals, drawTracks, drawYields } from "./map_marks.js";
 import { drawCells, drawPaths, drawScans } from "./map_paths.js";
 import { drawNumbers, drawRobot, drawnRadius } from "./map_robots.js";
 import { CostmapImages, drawCostmaps, drawFloor, drawObstacles, drawSolids } from "./map_scene.js";
-import { drawTracks } from "./map_tracks.js";
 import { Viewport } from "./viewport.js";
 
 const LEAST_SHARE = 0.8; // of the scale, for panels that stay free
@@ -75,13 +74,7 @@ export class MapView {
     this.viewport.zoomAt(px, py, factor);
   }
 
-  /**
-   * Show the whole arena.
-   *
-   * @param {object} fleet As in `fleet.js`.
-   * @param {{left: number, right: number, top: number}} covered Pixels that panels cover on each
-   *   side. They stay free, unless the arena becomes much smaller by that.
-   */
+  /** Show the whole arena; pixels that panels cover stay free, unless it becomes much smaller. */
   fit(fleet, covered) {
     const { viewport } = this;
     const margin = Math.min(20, viewport.width / 30);
@@ -110,12 +103,7 @@ export class MapView {
     return drawnRadius(robot, this.viewport.scale);
   }
 
-  /**
-   * Draw everything.
-   *
-   * @param {object} fleet As in `fleet.js`.
-   * @param {{labels: boolean}} options
-   */
+  /** Draw everything. */
   draw(fleet, { labels }) {
     this._drawBase(fleet);
     const context = this._context;
@@ -126,7 +114,7 @@ export class MapView {
     context.setTransform(this._ratio, 0, 0, this._ratio, 0, 0);
     drawObstacles(context, viewport, fleet.obstacles, fleet.altitude);
     drawCells(context, viewport, fleet.cells);
-    drawTracks(context, viewport, fleet.tracks);
+    drawTracks(context, toScreen, fleet.tracks);
     drawPaths(context, viewport, fleet);
     drawGoals(context, toScreen, fleet.goals, fleet.selected !== null);
     drawScans(context, viewport, fleet.scans);

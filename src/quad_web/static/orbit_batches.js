@@ -14,10 +14,12 @@ export function linear(colour) {
   return colours.get(colour);
 }
 
-/** Vertices with positions and colours. */
+/** Vertices with positions and colours; `Part` is a mesh, lines or points of three.js. */
 class Batch {
-  constructor(colourSize) {
-    this._colourSize = colourSize;
+  constructor(Part, material) {
+    Object.assign(material, { vertexColors: true, transparent: true, depthWrite: false });
+    this.object = new Part(new THREE.BufferGeometry(), material);
+    this.object.frustumCulled = false;
     this._count = 0;
     this._reserve(1024);
   }
@@ -30,7 +32,7 @@ class Batch {
     };
     this._capacity = capacity;
     this._positions = grown(this._positions, 3);
-    this._colours = grown(this._colours, this._colourSize);
+    this._colours = grown(this._colours, 4);
     this._isNew = true;
   }
 
@@ -39,13 +41,7 @@ class Batch {
       this._reserve(2 * this._capacity);
     }
     this._positions.set([x, y, z], 3 * this._count);
-    const offset = this._colourSize * this._count;
-    this._colours[offset] = colour.r;
-    this._colours[offset + 1] = colour.g;
-    this._colours[offset + 2] = colour.b;
-    if (this._colourSize === 4) {
-      this._colours[offset + 3] = alpha;
-    }
+    this._colours.set([colour.r, colour.g, colour.b, alpha], 4 * this._count);
     this._count += 1;
   }
 
@@ -62,7 +58,7 @@ class Batch {
       const attribute = (array, size) =>
         new THREE.BufferAttribute(array, size).setUsage(THREE.DynamicDrawUsage);
       geometry.setAttribute("position", attribute(this._positions, 3));
-      geometry.setAttribute("color", attribute(this._colours, this._colourSize));
+      geometry.setAttribute("color", attribute(this._colours, 4));
       this._isNew = false;
     }
     for (const attribute of Object.values(geometry.attributes)) {
@@ -77,28 +73,11 @@ class Batch {
 /** Flat bands along lines at one height. */
 export class Ribbons extends Batch {
   constructor() {
-    super(4);
-    const material = new THREE.MeshBasicMaterial({
-      vertexColors: true,
-      transparent: true,
-      depthWrite: false,
-      side: THREE.DoubleSide,
-    });
-    this.object = new THREE.Mesh(new THREE.BufferGeometry(), material);
-    this.object.frustumCulled = false;
+    super(THREE.Mesh, new THREE.MeshBasicMaterial({ side: THREE.DoubleSide }));
     this.object.renderOrder = 2;
   }
 
-  /**
-   * Add a band.
-   *
-   * @param {{points: Float32Array, width: number}} line `width` values for each point.
-   * @param {number} z Height, m.
-   * @param {string} colour
-   * @param {number} alpha
-   * @param {number} breadth Metres.
-   * @param {number} [shade] 1 is the colour itself, 0 is black.
-   */
+  /** Add a band at a height, metres broad; a shade of 1 is the colour itself, 0 is black. */
   add({ points, width }, z, colour, alpha, breadth, shade = 1) {
     const ink = linear(colour).clone().multiplyScalar(shade);
     for (let i = width; i < points.length; i += width) {
@@ -122,14 +101,7 @@ export class Ribbons extends Batch {
 /** Lines of one pixel. */
 export class Lines extends Batch {
   constructor() {
-    super(4);
-    const material = new THREE.LineBasicMaterial({
-      vertexColors: true,
-      transparent: true,
-      depthWrite: false,
-    });
-    this.object = new THREE.LineSegments(new THREE.BufferGeometry(), material);
-    this.object.frustumCulled = false;
+    super(THREE.LineSegments, new THREE.LineBasicMaterial());
   }
 
   /** Add a line between two points. */
@@ -152,10 +124,7 @@ export class Lines extends Batch {
 export class Points extends Batch {
   /** @param {number} size Pixels. */
   constructor(size) {
-    super(3);
-    const material = new THREE.PointsMaterial({ size, sizeAttenuation: false, vertexColors: true });
-    this.object = new THREE.Points(new THREE.BufferGeometry(), material);
-    this.object.frustumCulled = false;
+    super(THREE.Points, new THREE.PointsMaterial({ size, sizeAttenuation: false }));
   }
 
   /** Show the points of scans. */

@@ -19,11 +19,7 @@ export class MovingObstacles {
     this._solids = [];
   }
 
-  /**
-   * Show obstacles.
-   *
-   * @param {object} fleet As in `fleet.js`.
-   */
+  /** Show the obstacles of a fleet. */
   update({ scene, sceneRevision, obstacles }) {
     if (sceneRevision !== this._revision) {
       this._revision = sceneRevision;

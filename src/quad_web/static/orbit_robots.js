@@ -6,9 +6,9 @@ import { mergeGeometries } from "BufferGeometryUtils";
 import * as THREE from "three";
 
 import { INK } from "./colours.js";
+import { FAULTY } from "./map_robots.js";
 import { linear } from "./orbit_batches.js";
 
-const FAULTY = { lost: INK.fault, stopped: INK.fault, recovering: INK.waits };
 const ROTOR = 0.36; // radius of a rotor, for a hull of radius 1
 const ARM = (1 - ROTOR) * Math.SQRT1_2;
 const CORNERS = [
@@ -26,13 +26,7 @@ export class Quadcopters {
     this._parts = [];
   }
 
-  /**
-   * Show robots.
-   *
-   * @param {object[]} robots As in `fleet.js`.
-   * @param {?object} selected One of them.
-   * @param {(robot: object) => number} radiusOf Radius to draw with, m.
-   */
+  /** Show robots, one of them selected, with the radii in metres of a function. */
   update(robots, selected, radiusOf) {
     if (robots.length > this._capacity) {
       this._build(2 * robots.length);

@@ -7,31 +7,26 @@ import { OrbitControls } from "OrbitControls";
 
 import { INK } from "./colours.js";
 import { boundsOf } from "./fleet.js";
-import { drawContacts, drawYields } from "./map_marks.js";
+import { drawContacts, drawGoals, drawTracks, drawYields } from "./map_marks.js";
 import { drawNumbers } from "./map_robots.js";
 import { numberMarks } from "./map_view.js";
 import { Lines, Points, Ribbons } from "./orbit_batches.js";
-import { drawGoalNumbers, GoalMarks } from "./orbit_goals.js";
 import { MovingObstacles } from "./orbit_obstacles.js";
 import { Quadcopters } from "./orbit_robots.js";
 import { CostmapPlanes, disposeParts, sceneGroup } from "./orbit_scene.js";
-import { addTracks } from "./orbit_tracks.js";
+import { OUTSIDE } from "./viewport.js";
 
 const FIELD_OF_VIEW_DEG = 45;
 const ELEVATION_RAD = (52 * Math.PI) / 180;
 const LEAST_RADIUS_PX = 7;
 const MARGIN = 1.04;
 const FARTHEST = 4; // arenas away that a pixel may still be a place on
-const OUTSIDE = [-1e4, -1e4];
 
 /** View in space; see `MapView` for what the methods do. */
 export class OrbitView {
   /**
-   * @param {HTMLElement} root The arena's element.
-   * @param {HTMLElement} overlay The element that the pointer moves on.
-   * @param {{moved: () => void, lost: () => void}} host `moved`: the camera has moved; `lost`: the
-   *   browser has taken the graphics away.
-   * @throws {Error} There is no WebGL.
+   * The host has `moved()`, called when the camera has, and `lost()` when the browser has taken the
+   * graphics away. Throws an error without WebGL.
    */
   constructor(root, overlay, host) {
     const isSoftware = probe();
@@ -63,7 +58,6 @@ export class OrbitView {
     this._costmaps = new CostmapPlanes();
     this._obstacles = new MovingObstacles();
     this._quadcopters = new Quadcopters();
-    this._goals = new GoalMarks();
     this._ribbons = new Ribbons();
     this._points = new Points(3);
     this._lines = new Lines();
@@ -71,7 +65,6 @@ export class OrbitView {
       this._costmaps,
       this._obstacles,
       this._quadcopters,
-      this._goals,
       this._ribbons,
       this._points,
       this._lines,
@@ -220,7 +213,6 @@ export class OrbitView {
     this._costmaps.update(fleet.costmaps);
     this._obstacles.update(fleet);
     this._quadcopters.update(fleet.robots, fleet.selected, (robot) => this._radiusOf(robot));
-    this._goals.update(fleet, this.metresPerPixel);
     this._drawPaths(fleet);
     this._renderer.render(this._scene, this._camera);
   }
@@ -234,7 +226,7 @@ export class OrbitView {
     this._scene.add(this._arena);
   }
 
-  _drawPaths({ trails, plans, localPlans, tracks, cells, scans, robots, goals, altitude }) {
+  _drawPaths({ trails, plans, localPlans, cells, scans, robots, goals, altitude }) {
     const pixel = this.metresPerPixel;
     this._ribbons.clear();
     for (const path of trails) {
@@ -246,7 +238,6 @@ export class OrbitView {
     for (const path of localPlans) {
       this._ribbons.add(path, altitude, path.colour, 1, 4.5 * pixel, 0.5);
     }
-    addTracks(this._ribbons, tracks, altitude, 2 * pixel);
     this._ribbons.finish();
     this._points.update(scans);
     this._lines.clear();
@@ -265,7 +256,9 @@ export class OrbitView {
   /** Draw what has the same size at any distance, onto the overlay. */
   drawLabels(context, fleet, { labels }) {
     const toScreen = (x, y, z) => this.toScreen(x, y, z);
-    drawGoalNumbers(context, toScreen, fleet);
+    drawTracks(context, toScreen, fleet.tracks);
+    const isFree = (goal) => fleet.robots.every((robot) => distance(robot, goal) > robot.radius);
+    drawGoals(context, toScreen, fleet.goals.filter(isFree), fleet.selected !== null);
     drawYields(context, toScreen, fleet.yields, (robot) => this.reachOf(robot));
     drawContacts(context, toScreen, fleet.contacts);
     if (labels) {
@@ -279,6 +272,8 @@ export class OrbitView {
     this.canvas.remove();
   }
 }
+
+const distance = (a, b) => Math.hypot(a.x - b.x, a.y - b.y);
 
 /** Return the height of the highest wall, at least the flying altitude. */
 function topOf({ scene, altitude }) {

@@ -1,35 +1,45 @@
 /**
- * The last minute of the item `samples`: gap, clearance, speed and control-cycle time of each
- * robot.
+ * The last minute of the item `samples`, and the options of ECharts for its four charts.
  */
 
-/** Seconds that are kept. */
-export const SPAN_S = 60;
+import { INK, withAlpha } from "./colours.js";
+
+const SPAN_S = 60; // that is kept
 const SPACING_S = 0.1; // samples that are closer are left out
 const COLUMNS = 4;
+const FOUR_COLUMNS_PX = 860;
+const TWO_COLUMNS_PX = 340;
+const LEGEND_PX = 20;
+const FONT = "Roboto, system-ui, sans-serif";
 
-/** Samples in the order of time. */
+/** Up to so many robots have a line each; a larger fleet has a band. */
+const FEW_ROBOTS = 3;
+
+/** Title with its unit, and factor to that unit, of each column of the samples. */
+const CHARTS = [
+  { title: "Gap to the nearest robot, m", factor: 1 },
+  { title: "Clearance to obstacles, m", factor: 1 },
+  { title: "Speed, m/s", factor: 1 },
+  { title: "Control cycle, ms", factor: 1000 },
+];
+
+/** Gap, clearance, speed and control-cycle time of each robot, in the order of time. */
 export class SampleHistory {
   constructor() {
-    this.clear();
+    this._clear(0);
   }
 
-  /** Forget everything. */
-  clear() {
+  _clear(count) {
     this.times = [];
-    this.count = 0; // robots
+    this.count = count; // robots
     this._rows = [];
   }
 
-  /**
-   * Append what an item brings: one sample, and the ones before it in a connection's first message.
-   *
-   * @param {{data: {time_s: number}, arrays: Object<string, {values: any, shape: number[]}>}} item
-   */
+  /** Append what an item brings: one sample, and those before it in a connection's first one. */
   add({ data, arrays }) {
     const { times, history, values } = arrays;
     if (times) {
-      this.clear();
+      this._clear(history.shape[1]);
       const size = history.shape[1] * COLUMNS;
       times.values.forEach((time_s, i) => {
         this._append(time_s, history.values.subarray(i * size, (i + 1) * size));
@@ -40,26 +50,17 @@ export class SampleHistory {
 
   /** Append a sample. A robot more or less, or a time that goes back, begins anew. */
   _append(time_s, values) {
-    const newest_s = this.newest_s;
+    const newest_s = this.times.at(-1) ?? -Infinity;
     if (values.length !== COLUMNS * this.count || time_s < newest_s) {
-      this.clear();
-      this.count = values.length / COLUMNS;
+      this._clear(values.length / COLUMNS);
     } else if (time_s - newest_s < SPACING_S - 1e-6) {
       return;
     }
     this.times.push(time_s);
     this._rows.push(values);
-    let old = 0;
-    while (this.times[old] < time_s - SPAN_S) {
-      old += 1;
-    }
+    const old = this.times.findIndex((one) => one >= time_s - SPAN_S);
     this.times.splice(0, old);
     this._rows.splice(0, old);
-  }
-
-  /** Time of the last sample, -Infinity without one. */
-  get newest_s() {
-    return this.times.length ? this.times[this.times.length - 1] : -Infinity;
   }
 
   /** Return one value of one robot over time; NaN where it is unknown. */
@@ -74,14 +75,142 @@ export class SampleHistory {
     for (const row of this._rows) {
       let [low, high] = [Infinity, -Infinity];
       for (let i = column; i < row.length; i += COLUMNS) {
-        if (Number.isFinite(row[i])) {
-          low = Math.min(low, row[i]);
-          high = Math.max(high, row[i]);
-        }
+        low = row[i] < low ? row[i] : low;
+        high = row[i] > high ? row[i] : high;
       }
       least.push(low <= high ? low : NaN);
       greatest.push(low <= high ? high : NaN);
     }
     return { least, greatest };
   }
+}
+
+/** Return legend, titles, grids and axes for a size in pixels. */
+export function layoutOptions(width, height) {
+  const columns = width >= FOUR_COLUMNS_PX ? 4 : width >= TWO_COLUMNS_PX ? 2 : 1;
+  const cellWidth = width / columns;
+  const cellHeight = (height - LEGEND_PX) / (CHARTS.length / columns);
+  const corner = (i) => [
+    (i % columns) * cellWidth,
+    LEGEND_PX + Math.floor(i / columns) * cellHeight,
+  ];
+  const text = { fontFamily: FONT, fontSize: 11, color: "#52606d" };
+  const legendText = { ...text, fontSize: 12, color: INK.text };
+  return {
+    animation: false,
+    textStyle: text,
+    legend: {
+      top: 2,
+      left: 4,
+      icon: "rect",
+      itemHeight: 3,
+      itemWidth: 20,
+      selectedMode: false,
+      textStyle: legendText,
+    },
+    title: CHARTS.map(({ title }, i) => ({
+      text: title,
+      left: corner(i)[0] + 8,
+      top: corner(i)[1] + 2,
+      textStyle: { ...legendText, fontWeight: 500 },
+    })),
+    grid: CHARTS.map((_, i) => ({
+      left: corner(i)[0] + 36,
+      top: corner(i)[1] + 24,
+      width: Math.max(cellWidth - 50, 20),
+      height: Math.max(cellHeight - 46, 20),
+    })),
+    xAxis: CHARTS.map((_, i) => ({
+      gridIndex: i,
+      type: "value",
+      min: -SPAN_S,
+      max: 0,
+      interval: cellWidth > 260 ? 10 : 20,
+      axisLabel: { ...text, formatter: (value) => (value ? `${value} s` : "now") },
+      splitLine: { show: false },
+      axisLine: { onZero: false, lineStyle: { color: INK.gridStrong } },
+    })),
+    yAxis: CHARTS.map((_, i) => ({
+      gridIndex: i,
+      type: "value",
+      min: ({ min }) => Math.min(0, min),
+      splitNumber: 3,
+      axisLabel: text,
+      axisLine: { show: false, onZero: false },
+      axisTick: { show: false },
+      splitLine: { lineStyle: { color: INK.grid } },
+    })),
+  };
+}
+
+/** Return the lines of all charts; that of the selected robot is bold. */
+export function seriesOptions(history, selected, colourOf) {
+  const isFew = history.count <= FEW_ROBOTS;
+  const robots = [...Array(history.count).keys()].filter((i) => isFew || i === selected);
+  return CHARTS.flatMap(({ factor }, column) => {
+    const place = { xAxisIndex: column, yAxisIndex: column, silent: true };
+    const own = (robot) => ({
+      ...place,
+      type: "line",
+      name: `robot ${robot}`,
+      showSymbol: false,
+      data: points(history.times, history.line(robot, column), factor),
+      color: colourOf(robot),
+      lineStyle: { width: robot === selected ? 3 : 1.5 },
+      z: robot === selected ? 3 : 2,
+    });
+    return [
+      ...(isFew ? [] : [bandOptions(place, history, column, factor)]),
+      ...robots.map(own),
+    ];
+  });
+}
+
+/** A band between the least and the greatest value; where they are unknown, it has gaps. */
+function bandOptions(place, history, column, factor) {
+  const { least, greatest } = history.band(column);
+  const low = points(history.times, least, factor);
+  const high = points(history.times, greatest, factor);
+  const fill = withAlpha(INK.limited, 0.35);
+  return {
+    ...place,
+    type: "custom",
+    name: `all ${history.count}: least to greatest`,
+    color: fill,
+    clip: true,
+    data: low.map(([seconds, value], i) => [seconds, value, high[i][1]]),
+    encode: { x: 0, y: [1, 2] },
+    renderItem: ({ dataIndex }, api) => ({
+      type: "group", // drawn once for all samples
+      children: (dataIndex ? [] : stretches(low, high)).map((outline) => ({
+        type: "polygon",
+        shape: { points: outline.map((point) => api.coord(point)) },
+        style: { fill },
+      })),
+    }),
+  };
+}
+
+/** Return the outlines of a band, one for each stretch without gaps. */
+export function stretches(low, high) {
+  const outlines = [];
+  let first = 0;
+  for (let i = 0; i <= low.length; i += 1) {
+    if (i === low.length || low[i][1] === null) {
+      if (i - first > 1) {
+        outlines.push([...high.slice(first, i), ...low.slice(first, i).reverse()]);
+      }
+      first = i + 1;
+    }
+  }
+  return outlines;
+}
+
+/** Return [seconds before the newest, value]; unknown values are gaps. */
+function points(times, values, factor) {
+  const newest_s = times.at(-1);
+  return values.map((value, i) => [
+    times[i] - newest_s,
+    Number.isFinite(value) ? value * factor : null,
+  ]);
 }

@@ -2,6 +2,18 @@
  * Projection of the map view: metres in `map` (x right, y up) to CSS pixels (y down).
  */
 
+/** Pixels of what the view cannot show. */
+export const OUTSIDE = [-1e4, -1e4];
+
+/** Trace a line through places in pixels; those outside interrupt it. */
+export function tracePath(context, places) {
+  context.beginPath();
+  places.forEach((place, i) => {
+    const isSeen = i > 0 && place !== OUTSIDE && places[i - 1] !== OUTSIDE;
+    isSeen ? context.lineTo(...place) : context.moveTo(...place);
+  });
+}
+
 const LEAST_SCALE = 1; // pixels per metre
 const GREATEST_SCALE = 2000;
 
@@ -45,13 +57,7 @@ export class Viewport {
     this.y = y + (py - this.height / 2) / this.scale;
   }
 
-  /**
-   * Show a rectangle as large as it fits.
-   *
-   * @param {{minX: number, minY: number, maxX: number, maxY: number}} bounds Metres.
-   * @param {{left: number, right: number, top: number, bottom: number}} insets Pixels that stay
-   *   free on each side.
-   */
+  /** Show a rectangle in metres as large as it fits; insets are pixels that stay free. */
   fit(bounds, { left, right, top, bottom }) {
     this.scale = Math.min(
       Math.max(this.width - left - right, 10) / Math.max(bounds.maxX - bounds.minX, 0.1),
@@ -74,14 +80,7 @@ export function formatLength(metres) {
   return metres < 1 ? `${Math.round(metres * 100)} cm` : `${Math.round(metres)} m`;
 }
 
-/**
- * Return the index of the nearest point within a distance, -1 if there is none.
- *
- * @param {number[][]} points Pixels.
- * @param {number} px Pixels.
- * @param {number} py Pixels.
- * @param {(index: number) => number} reach Largest distance of each point, in pixels.
- */
+/** Return the index of the nearest point within the reach of each, in pixels; -1 without one. */
 export function nearest(points, px, py, reach) {
   let best = -1;
   let least = Infinity;

@@ -8,7 +8,7 @@ commands inside of it.
 from __future__ import annotations
 
 import math
-from typing import Any, List, Sequence, Tuple
+from typing import Any, List, Mapping, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,16 +20,13 @@ from quad_web.view.state import Item
 Point = Tuple[float, float]
 
 
-def cell_items(
-    scene: Scene, positions: Any, safety_radius_m: float, robots: Sequence[int]
-) -> List[Item]:
+def cell_items(scene: Scene, positions: Any, radii_m: Mapping[int, float]) -> List[Item]:
     """Return the cells of some robots; without a point for a robot whose cell is empty.
 
     Args:
         scene: Has the arena.
         positions: float64[n, 2], of all robots, in ``map``; NaN for an unknown one.
-        safety_radius_m: Radius of a robot plus the margin.
-        robots: Numbers of the robots whose cells are wanted.
+        radii_m: Radius plus the margin, by the numbers of the robots whose cells are wanted.
     """
     corners = (
         (scene.origin_x_m, scene.origin_y_m),
@@ -39,8 +36,8 @@ def cell_items(
     )
     positions = np.asarray(positions, np.float64)
     return [
-        line_item("cell", robot, buffered_cell(positions, robot, corners, safety_radius_m))
-        for robot in robots
+        line_item("cell", robot, buffered_cell(positions, robot, corners, radius_m))
+        for robot, radius_m in radii_m.items()
         if np.isfinite(positions[robot]).all()
     ]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import collections
 import math
-from typing import Any, Deque, Dict, Iterable, List, Optional, Sequence, Tuple
+from typing import Any, Deque, Dict, Iterable, List, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,22 +95,14 @@ def moving_solids(scene: Scene, poses: Any) -> List[Obstacle]:
 def robots_item(
     names: Sequence[str],
     radius_m: float,
-    footprint: Optional[Sequence[Tuple[float, float]]] = None,
 ) -> Item:
-    """Return the item ``robots``.
-
-    Args:
-        names: Name of robot 0, 1, ...
-        radius_m: Radius of a robot's hull.
-        footprint: Corners in ``base_link``, None for a round one.
-    """
+    """Return the item ``robots``: names of robot 0, 1, ..., and the radius of their hulls."""
     return Item(
         "robots",
         {
             "names": list(names),
             "colours": [colour_of(robot) for robot in range(len(names))],
             "radius_m": radius_m,
-            "footprint": None if footprint is None else [list(corner) for corner in footprint],
         },
     )
 
@@ -151,13 +143,7 @@ def poses_item(stamp_s: float, wall_s: float, bodies: Any) -> Item:
 
 
 def line_item(layer: str, robot: int, points: Any) -> Item:
-    """Return a plan, trail or cell of a robot.
-
-    Args:
-        layer: "plan", "local_plan", "trail" or "cell".
-        robot: Number of the robot.
-        points: float64[k, 2 or more], x and y first, in ``map``.
-    """
+    """Return a plan, trail or cell of a robot: points float64[k, 2 or more] in ``map``."""
     plane = np.zeros((len(points), 2), np.float32)
     if len(points):
         plane[:] = np.asarray(points)[:, :2]
@@ -165,13 +151,7 @@ def line_item(layer: str, robot: int, points: Any) -> Item:
 
 
 def track_item(robot: int, rows: Any, map_from_frame: Pose2D = _MAP) -> Item:
-    """Return the tracks and suspects of a robot.
-
-    Args:
-        robot: Number of the robot.
-        rows: float64[k, 6] as of ``topics.tracked_obstacles.track_rows``.
-        map_from_frame: Their frame in ``map``.
-    """
+    """Return the tracks of a robot, float64[k, 6] as of ``tracked_obstacles.track_rows``."""
     placed = np.array(rows, np.float64)
     placed[:, :2] = map_from_frame.transform_points(placed[:, :2])
     placed[:, 2:4] = Pose2D(0.0, 0.0, map_from_frame.yaw_rad).transform_points(placed[:, 2:4])
@@ -179,23 +159,15 @@ def track_item(robot: int, rows: Any, map_from_frame: Pose2D = _MAP) -> Item:
 
 
 def scan_item(robot: int, scan: Scan, map_from_lidar: Pose3D) -> Item:
-    """Return a scan's hit points."""
-    points = hit_points(scan, map_from_lidar).astype(np.float32)
-    return Item(f"scan/{robot}", {"stamp_s": scan.stamp_s}, {"points": points})
-
-
-def hit_points(scan: Scan, map_from_lidar: Pose3D) -> Floats:
-    """Return the hit points of a scan in ``map``, float64[n, 3], metres.
-
-    Beams without a return are left out.
-    """
+    """Return the hit points of a scan in ``map``; beams without a return are left out."""
     hits = np.isfinite(scan.ranges_m)
     ranges_m = scan.ranges_m[hits].astype(np.float64)
     angles = scan.angle_min_rad + np.nonzero(hits)[0] * scan.angle_increment_rad
     points = np.column_stack(
         (ranges_m * np.cos(angles), ranges_m * np.sin(angles), np.zeros(len(angles)))
     )
-    return map_from_lidar.transform_points(points)
+    points = map_from_lidar.transform_points(points).astype(np.float32)
+    return Item(f"scan/{robot}", {"stamp_s": scan.stamp_s}, {"points": points})
 
 
 def costmap_item(

@@ -194,7 +194,7 @@ class FleetState:
         self.put_all([Item(key, data, arrays or {})])
 
     def put_all(self, items: List[Item], removed: Tuple[str, ...] = ()) -> None:
-        """Set and remove items together: no client sees a part of them."""
+        """Set and remove items together, also such that are not there: no client sees a part."""
         with self._lock:
             self._version += 1
             for item in items:
@@ -218,10 +218,6 @@ class FleetState:
         for listener in self._listeners:
             listener()
 
-    def remove(self, *keys: str) -> None:
-        """Remove items, also such that are not there."""
-        self.put_all([], keys)
-
     def clear(self) -> None:
         """Remove all items and events, as for another flight."""
         with self._lock:
@@ -242,11 +238,6 @@ class FleetState:
         """Return what each client shows; empty without clients, when a source can rest."""
         with self._lock:
             return tuple(self._wanted.values())
-
-    def is_wanted(self, layer: str, robot: int) -> bool:
-        """Return whether a client shows this layer of this robot."""
-        item = Item(f"{layer}/{robot}")
-        return any(wanted.includes(item) for wanted in self.wanted())
 
     # -- read by clients -------------------------------------------------------------
 
@@ -278,12 +269,7 @@ class FleetState:
             self._wanted.pop(client, None)
 
     def changes(self, wanted: Wanted, versions: Mapping[str, int]) -> Changes:
-        """Return what a client lacks.
-
-        Args:
-            wanted: What it shows.
-            versions: Version of each item that it has, by key.
-        """
+        """Return what a client lacks that shows ``wanted`` and has items of these versions."""
         with self._lock:
             here = {
                 key: (version, item)
@@ -292,7 +278,7 @@ class FleetState:
             }
             samples = tuple(self._samples) if "samples" not in versions else ()
         changed = [
-            _with_history(item, samples) if samples and key == "samples" else item
+            with_history(item, samples[:-1]) if samples and key == "samples" else item
             for key, (version, item) in here.items()
             if versions.get(key) != version
         ]
@@ -308,19 +294,19 @@ class FleetState:
             entry = self._items.get(key)
         return entry[1] if entry else None
 
-    def events(self, first: int = 0) -> List[Event]:
-        """Return the events from a number on that are still in the log."""
+    def events(self) -> List[Event]:
+        """Return the events that are still in the log."""
         with self._lock:
-            return [event for event in self._events if event.number >= first]
+            return list(self._events)
 
 
-def _with_history(item: Item, samples: Tuple[Item, ...]) -> Item:
-    """Return the item ``samples`` as a new client gets it; the last of the samples is the item."""
+def with_history(item: Item, before: Sequence[Item]) -> Item:
+    """Return the item ``samples`` as a new client gets it, with the samples before it."""
     history: Dict[str, NDArray[Any]] = {
-        "times": np.array([sample.data["time_s"] for sample in samples[:-1]], np.float64),
-        "history": np.array(
-            [sample.arrays["values"] for sample in samples[:-1]], np.float32
-        ).reshape(-1, *item.arrays["values"].shape),
+        "times": np.array([sample.data["time_s"] for sample in before], np.float64),
+        "history": np.array([sample.arrays["values"] for sample in before], np.float32).reshape(
+            -1, *item.arrays["values"].shape
+        ),
     }
     return Item(item.key, item.data, {**item.arrays, **history})
 
@@ -328,12 +314,7 @@ def _with_history(item: Item, samples: Tuple[Item, ...]) -> Item:
 def robots_by_layer(
     wanted: Optional[Sequence[Wanted]], robots: Sequence[int]
 ) -> Dict[str, FrozenSet[int]]:
-    """Return the robots of which a layer is shown, by layer.
-
-    Args:
-        wanted: What the clients show; None for everything of all robots.
-        robots: Numbers of all robots.
-    """
+    """Return the robots of which a layer is shown, by layer; ``wanted`` None is everything."""
     everybody: FrozenSet[int] = frozenset(robots)
     if wanted is None:
         return dict.fromkeys(LAYERS, everybody)

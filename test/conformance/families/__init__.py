@@ -3,8 +3,7 @@
 A family is a folder of recorded cases, all of one kind. Its module here has
 ``check(path)``: it computes a case anew and returns the differences, none of
 which is wanted. The tests and ``run.py`` both call it. For another family write
-``<family>.py`` with a ``check`` in the way of ``inflation.py``, name it in
-``FAMILIES``, and have ``test_<family>.py`` call it as ``test_inflation.py`` does.
+``<family>.py`` with a ``check`` in the way of ``inflation.py``, and name it in ``FAMILIES``.
 """
 
 from __future__ import annotations

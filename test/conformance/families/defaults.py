@@ -9,7 +9,6 @@ from typing import Any, Dict, List
 from families.case import InvalidValue, Recorded
 from families.comparison import Comparison, Difference
 from quad_nav.config import Configuration, load, values
-from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
 from quad_nav.costmap.inflation import InflationLayer
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayer
@@ -25,7 +24,7 @@ def check(path: Path) -> List[Difference]:
         raise InvalidValue(f"cannot be read: {error}") from error
     configuration = load({})
     _check_costmap(configuration, recorded["costmap_defaults"], comparison)
-    _check_planner(configuration.local_planner, recorded["trajectory_planner_defaults"], comparison)
+    _check_planner(configuration, recorded["trajectory_planner_defaults"], comparison)
     dwa = values(load({"base_local_planner": "dwa_local_planner/DWAPlannerROS"}), "DWAPlannerROS")
     del dwa["restore_defaults"]  # a button, not recorded
     _compare(comparison, "dwa_defaults", dwa, recorded["dwa_defaults"])
@@ -100,36 +99,13 @@ def _inflation_fields(costmap: LayeredCostmap) -> Dict[str, Any]:
     }
 
 
-_PLANNER = {
-    "acc_lim_x": "acc_lim_x_mps2",
-    "acc_lim_y": "acc_lim_y_mps2",
-    "acc_lim_theta": "acc_lim_theta_radps2",
-    "max_vel_x": "max_vel_x_mps",
-    "min_vel_x": "min_vel_x_mps",
-    "max_vel_th": "max_vel_theta_radps",
-    "min_vel_th": "min_vel_theta_radps",
-    "min_in_place_vel_th": "min_in_place_vel_theta_radps",
-    "sim_time": "sim_time_s",
-    "sim_granularity": "sim_granularity_m",
-    "angular_sim_granularity": "angular_sim_granularity_rad",
-    "path_distance_bias": "path_distance_bias",
-    "goal_distance_bias": "goal_distance_bias",
-    "occdist_scale": "occdist_scale",
-    "oscillation_reset_dist": "oscillation_reset_dist_m",
-    "escape_reset_dist": "escape_reset_dist_m",
-    "escape_reset_theta": "escape_reset_theta_rad",
-    "vx_samples": "vx_samples",
-    "vtheta_samples": "vtheta_samples",
-    "heading_lookahead": "heading_lookahead_m",
-    "holonomic_robot": "holonomic_robot",
-    "backup_vel": "escape_vel_mps",
-    "dwa": "dwa",
-    "heading_scoring": "heading_scoring",
-    "heading_scoring_timestep": "heading_scoring_timestep_s",
-    "simple_attractor": "simple_attractor",
-    "y_vels": "y_vels_mps",
+_UPSTREAM_NAMES = {
+    "max_vel_theta": "max_vel_th",
+    "min_vel_theta": "min_vel_th",
+    "min_in_place_vel_theta": "min_in_place_vel_th",
+    "escape_vel": "backup_vel",
 }
-"""Upstream's names of the trajectory planner's parameters, and ours."""
+"""Names of the trajectory planner's parameters in the original, where they are others."""
 _ROS = {
     "rot_stopped_velocity": "rot_stopped_velocity_radps",
     "trans_stopped_velocity": "trans_stopped_velocity_mps",
@@ -139,15 +115,20 @@ _ROS = {
     "max_vel_th": "max_rotational_vel_radps",
     "latch_xy_goal_tolerance": "latch_xy_goal_tolerance",
 }
-"""The same for the ROS wrapper of the planner."""
+"""Parameters of the ROS wrapper of the planner, and ours."""
 
 
 def _check_planner(
-    params: TrajectoryPlannerParams, recorded: Recorded, comparison: Comparison
+    configuration: Configuration, recorded: Recorded, comparison: Comparison
 ) -> None:
-    for part, names in (("planner", _PLANNER), ("ros", _ROS)):
-        found = {name: getattr(params, field) for name, field in names.items()}
-        _compare(comparison, f"trajectory_planner_defaults.{part}", found, recorded[part])
+    params, place = configuration.local_planner, "trajectory_planner_defaults"
+    planner = values(configuration, "TrajectoryPlannerROS")
+    del planner["restore_defaults"], planner["respect_meter_scoring"]  # not upstream's
+    planner["y_vels"] = params.y_vels_mps
+    planner = {_UPSTREAM_NAMES.get(name, name): value for name, value in planner.items()}
+    _compare(comparison, f"{place}.planner", planner, recorded["planner"])
+    wrapper = {name: getattr(params, field) for name, field in _ROS.items()}
+    _compare(comparison, f"{place}.ros", wrapper, recorded["ros"])
 
 
 def _compare(comparison: Comparison, place: str, found: Dict[str, Any], recorded: Recorded) -> None:

@@ -15,9 +15,10 @@ from families.loop import period_s, plan_of, replayed, spec_at
 from quad_nav.config import load
 from quad_nav.control.controller import Control
 from quad_nav.control.oscillation import Oscillation
-from quad_nav.control.rollout import Rollout, footprint_cost
+from quad_nav.control.rollout import Rollout
 from quad_nav.control.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
 from quad_nav.control.velocity_search import choose_trajectory
+from quad_nav.costmap.collision import footprint_cost
 from quad_nav.geometry import Pose2D, Twist2D
 
 _TOLERANCE = 1e-9
@@ -81,7 +82,7 @@ def _check_single(case: Case, comparison: Comparison) -> None:
 
     _check_samples(rollout, recorded, comparison)
     costs = [
-        footprint_cost(spec, recorded["costmap"], recorded["footprint"], Pose2D(*pose))
+        footprint_cost(rollout.inputs.costmap, recorded["footprint"], tuple(pose))
         for pose in recorded["footprint_poses"]
     ]
     comparison.exact("footprint_costs", costs, recorded["footprint_costs"])

@@ -39,15 +39,9 @@ def flown(setup, trace):
 
 
 def test_importing_the_package_loads_no_engine():
-    code = "import sys, quad_nav; print(sorted({'numpy', 'numba', 'pybullet'} & set(sys.modules)))"
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env={"PYTHONPATH": str(ROOT / "src")},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout == "[]\n"
+    code = "import sys, quad_nav; assert not {'numpy', 'numba', 'pybullet'} & set(sys.modules)"
+    environment = {"PYTHONPATH": str(ROOT / "src")}
+    subprocess.run([sys.executable, "-c", code], env=environment, check=True)
 
 
 def test_every_name_is_there_and_typed():
@@ -116,15 +110,8 @@ def test_recorded_commands_replayed_without_navigators_fly_the_same_flight(flown
     robots = trace.trace().robots
     with quad_nav.Flight(setup, navigators=False) as flight:
         for _ in range(len(flown.trajectories[0]) - 1):
-            flight.step(
-                {
-                    number: quad_nav.Command(
-                        *robot.commands[robot.command_times_s == flight.now_s][0]
-                    )
-                    for number, robot in enumerate(robots)
-                    if flight.now_s in robot.command_times_s
-                }
-            )
+            now = [robot.commands[robot.command_times_s == flight.now_s] for robot in robots]
+            flight.step({k: quad_nav.Command(*row[0]) for k, row in enumerate(now) if len(row)})
         result = flight.result()
     for one, other in zip(flown.trajectories, result.trajectories):
         assert np.array_equal(one, other)
@@ -145,16 +132,6 @@ def test_steps_observe_poses_goals_scans_and_contacts(setup):
     assert seen.pose.distance_to(other.pose) == pytest.approx(
         np.hypot(*(flight.positions_m[0] - flight.positions_m[1])[:2])
     )
-
-
-def test_parameters_change_between_steps(setup):
-    with quad_nav.Flight(setup) as flight:
-        slow = flight.reconfigure(0, {"TrajectoryPlannerROS/max_vel_x": 0.1})
-        assert slow.local_planner.max_vel_x_mps == 0.1
-        for _ in range(80):
-            flight.step()
-        speeds = flight.result().trajectories
-    assert speeds[0][:, 9].max() < 0.15 < 0.2 < speeds[1][:, 9].max()
 
 
 def test_goals_scenes_and_configurations_may_be_objects(flown, setup, tmp_path):
@@ -181,21 +158,18 @@ def test_faults_name_what_the_caller_gave():
 
 
 @pytest.mark.parametrize(
-    "use, message",
+    "commands, message",
     [
-        (lambda flight: flight.step({2: None}), "commands for robots [2]; expected 0 to 1"),
-        (
-            lambda flight: flight.step({0: quad_nav.Command(float("nan"), 0.0, 0.0)}),
-            "quad0: command is not finite",
-        ),
-        (lambda flight: (flight.close(), flight.step()), "the flight is closed"),
+        ({2: None}, "commands for robots .2.; expected 0 to 1"),
+        ({0: quad_nav.Command(float("nan"), 0.0, 0.0)}, "quad0: command is not finite"),
     ],
 )
-def test_steps_that_cannot_be_flown_are_refused(use, message, setup):
+def test_steps_that_cannot_be_flown_are_refused(commands, message, setup):
     with quad_nav.Flight(setup, navigators=False) as flight:
-        with pytest.raises(ValueError) as caught:
-            use(flight)
-    assert message in str(caught.value)
+        with pytest.raises(ValueError, match=message):
+            flight.step(commands)
+    with pytest.raises(ValueError, match="the flight is closed"):
+        flight.step()
     flight.close()  # a second time
 
 

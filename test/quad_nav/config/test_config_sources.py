@@ -9,7 +9,7 @@ from quad_nav.cli import main
 from quad_nav.config.check import check_source
 from quad_nav.config.launch_file import load_launch_file
 from quad_nav.config.robot_tree import RobotSource, unfitted_tree
-from quad_nav.config.sources import config_label, robot_set, sets_of
+from quad_nav.config.sources import config_label, robot_set
 from quad_nav.config.substitution import Substitution, Unresolved
 from quad_nav.errors import InputError
 
@@ -79,12 +79,6 @@ def refusal(name):
     return "\n".join(caught.value.problems)
 
 
-def test_every_combination_of_alternatives_is_a_set(tmp_path):
-    write(tmp_path, LAYOUT)
-    names = [one.name for one in sets_of(str(tmp_path))[0]]
-    assert names == ["big,laser", "big,static", "small,laser", "small,static"]
-
-
 def test_a_flight_needs_a_choice_and_the_refusal_has_it_to_copy(tmp_path):
     write(tmp_path, LAYOUT)
     assert refusal(tmp_path) == (
@@ -109,9 +103,8 @@ def test_values_of_arguments_in_the_files_of_a_folder(tmp_path):
 
 def test_unknown_choice_lists_what_there_is(tmp_path):
     write(tmp_path, LAYOUT)
-    assert refusal(f"{tmp_path}:medium") == (
-        f"config: {tmp_path}:medium: no configuration 'medium'; there are"
-        " big,laser, big,static, small,laser, small,static"
+    assert refusal(f"{tmp_path}:medium").endswith(
+        "no configuration 'medium'; there are big,laser, big,static, small,laser, small,static"
     )
 
 
@@ -217,22 +210,13 @@ def test_substitutions(tmp_path, text, expected):
     assert words.text(text) == expected
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "$(eval __import__('os').getcwd())",
-        "$(eval a.b)",
-        "$(eval int(1e999))",
-        "$(eval " + "(" * 500 + ")" * 500 + ")",
-        "$(env NO_SUCH_VARIABLE)",
-        "$(find ../..)",
-        "$(find /etc)",
-        "$(c d)",
-    ],
-)
-def test_substitutions_that_are_not_resolved(tmp_path, text):
-    with pytest.raises(Unresolved):
-        Substitution(tmp_path / "x.launch", {"a": "1"}).text(text)
+def test_substitutions_that_are_not_resolved(tmp_path):
+    words = Substitution(tmp_path / "x.launch", {"a": "1"})
+    texts = ["$(env NO_SUCH_VARIABLE)", "$(find ../..)", "$(find /etc)", "$(c d)"]
+    evils = ["__import__('os').getcwd()", "a.b", "int(1e999)", "(" * 500 + ")" * 500]
+    for text in texts + [f"$(eval {evil})" for evil in evils]:
+        with pytest.raises(Unresolved):
+            words.text(text)
 
 
 def test_check_and_fly_tell_the_same(tmp_path):

@@ -12,8 +12,6 @@ from quad_nav.config.configuration import MOVE_BASE_TABLE
 from quad_nav.config.fixes import GROUPS
 from quad_nav.config.planners import LOCAL_PLANNERS, TRAJECTORY_PLANNER
 from quad_nav.costmap.inflation import InflationLayerParams
-from quad_nav.costmap.observation import SourceParams
-from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.recovery import ClearCostmapParams, RotateParams, TurnLimits
 
 CONFIG = Path(__file__).resolve().parents[3] / "config"
@@ -101,37 +99,16 @@ def test_only_remark_is_on_the_long_update_period():
 
 def test_costmaps():
     configuration = load(tutorial("1"), "/move_base1")
-    source = SourceParams(
-        "base_scan",
-        "scan1",
-        "Lidar1",
-        data_type="LaserScan",
-        observation_persistence_s=1.0,
-        expected_update_period_s=21.0,
-        min_obstacle_height_m=-0.1,
-        max_obstacle_height_m=2.0,
-        obstacle_range_m=2.0,
-        raytrace_range_m=6.0,
-        marking=True,
-        clearing=True,
-        inf_is_valid=True,
-    )
-    layers = (
-        (
-            "obstacle_layer",
-            ObstacleLayerParams(observation_sources="base_scan", sources=(source,)),
-        ),
-        ("inflation_layer", InflationLayerParams(inflation_radius_m=0.4)),
-    )
-    for costmap in (configuration.global_costmap, configuration.local_costmap):
-        assert costmap.layers == layers
+    for costmap in configuration.costmaps.values():
+        (_, obstacles), (_, inflation) = costmap.layers
+        (source,) = obstacles.sources
+        assert (source.topic, source.sensor_frame) == ("scan1", "Lidar1")
+        assert (source.obstacle_range_m, source.raytrace_range_m) == (2.0, 6.0)
+        assert (source.min_obstacle_height_m, source.max_obstacle_height_m) == (-0.1, 2.0)
+        assert (source.expected_update_period_s, source.inf_is_valid) == (21.0, True)
+        assert inflation == InflationLayerParams(inflation_radius_m=0.4)
         assert (costmap.robot_radius_m, costmap.footprint) == (0.35, None)
         assert (costmap.global_frame, costmap.robot_base_frame) == ("map", "base_link1")
-    local = configuration.local_costmap
-    assert (local.width_m, local.height_m, local.resolution_m) == (3.0, 3.0, 0.025)
-    assert (local.update_frequency_hz, local.publish_frequency_hz) == (4.0, 2.0)
-    assert local.rolling_window and not configuration.global_costmap.rolling_window
-    assert configuration.global_costmap.resolution_m == 0.05
 
 
 def test_planner_keeps_the_defaults_of_dynamic_reconfigure():

@@ -146,12 +146,6 @@ def test_errors_on_purpose_and_results_pass(plugin):
     assert (type(made).__name__, type(made).__module__) == ("Planner", "mistakes")
 
 
-def test_import_errors_have_file_and_line(plugin):
-    plugin.write_text("x = 1\ndef y(:\n")
-    with pytest.raises(InputError, match=rf"SyntaxError: invalid syntax \({plugin}:2\)"):
-        planner("Planner")
-
-
 def options(**changed):
     given = FlightOptions(None, shipped("goals"), time_limit_s=5.0, robots=2)
     return replace(given, **changed)

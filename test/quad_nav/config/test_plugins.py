@@ -205,7 +205,11 @@ def test_nothing_of_a_plugin_is_reconfigurable(tree):
     assert namespaces == {"", *costmaps, *inflation, *GROUPS}
 
 
-def test_error_on_a_missing_parameter_names_its_place(tree):
+def test_errors_in_parameters_name_their_place(tree):
+    tree["global_costmap"]["pond"] = {"enabled": "no"}
+    assert problems(tree) == [
+        "/nav/global_costmap/pond/enabled: 'no' is not a boolean; expected true or false"
+    ]
     del tree["back_off"]
     tree["global_costmap"]["pond"] = {"x": 1.0}
     configuration = config.load(tree)
@@ -214,13 +218,6 @@ def test_error_on_a_missing_parameter_names_its_place(tree):
     tree["global_costmap"] = COSTMAP
     with pytest.raises(InputError, match="^back_off/distance: missing; expected a value$"):
         build_navigator(config.load(tree))
-
-
-def test_enabled_of_a_layer_has_to_be_a_boolean(tree):
-    tree["global_costmap"]["pond"] = {"enabled": "no"}
-    assert problems(tree) == [
-        "/nav/global_costmap/pond/enabled: 'no' is not a boolean; expected true or false"
-    ]
 
 
 def test_namespace_of_a_plugin():

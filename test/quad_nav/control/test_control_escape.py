@@ -52,11 +52,6 @@ def test_where_nothing_is_better_there_is_no_way_out(costs):
     assert escape(SPEC, costs, FOOTPRINT, Pose2D(HERE, HERE)) is None
 
 
-def test_nothing_beyond_the_map_is_better_and_off_the_map_there_is_none():
-    assert escape(SPEC, slope(), FOOTPRINT, Pose2D(1.99, HERE, 0.0)) != Twist2D(SPEED_MPS)
-    assert escape(SPEC, slope(), FOOTPRINT, Pose2D(3.0, HERE)) is None
-
-
 def test_one_that_is_not_round_has_none():
     oblong = np.array([[0.4, 0.2], [-0.4, 0.2], [-0.4, -0.2], [0.4, -0.2]])
     assert not is_round(oblong) and is_round(FOOTPRINT) and is_round(np.zeros((0, 2)))

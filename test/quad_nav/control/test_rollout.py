@@ -10,14 +10,16 @@ import pytest
 
 from quad_nav.control.lanes import OFF_MAP, UNCERTAIN
 from quad_nav.control.rollout import Rollout
-from quad_nav.control.sample_motion import (
-    RolloutParams,
-    last_cells,
-    longest,
-    travel,
-)
+from quad_nav.control.rollout_kernel import cheapest
+from quad_nav.control.sample_motion import RolloutParams, last_cells, longest, travel
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
-from quad_nav.control.velocity_search_kernel import NO_SAMPLE, SampleRules, VelocityWindow, spaced
+from quad_nav.control.velocity_search import (
+    NO_SAMPLE,
+    SampleRules,
+    VelocityWindow,
+    search,
+    spaced,
+)
 from quad_nav.costmap.cost_grid_kernel import CostmapView
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import FREE, LETHAL, GridSpec
@@ -76,8 +78,8 @@ def test_the_cheapest_is_that_of_all_scores(variant):
         legal = np.where(costs >= 0.0, costs, np.inf)
         illegal += np.count_nonzero(costs < 0.0)
         k = int(np.argmin(legal))
-        expected = (k, costs[k]) if costs[k] >= 0.0 else None
-        assert rollout.cheapest(samples()) == expected
+        expected = (k, costs[k]) if costs[k] >= 0.0 else (-1, np.inf)
+        assert cheapest(rollout.inputs, samples()) == expected
     assert illegal > 50
 
 
@@ -98,7 +100,7 @@ def test_the_search_finds_what_scoring_every_sample_finds(holonomic, forwards):
     for seed in range(20):
         rollout = random_rollout(seed, PARAMS)
         window = VelocityWindow(0.05, 0.5 if seed % 2 else 0.05, -1.0, 1.0)
-        found = rollout.search(window, rules)
+        found = search(rollout.inputs, window, rules)
         assert found == scored_one_by_one(rollout, window, rules)
         turned += found[0][0] == 0.0 and found[1] != NO_SAMPLE
     assert turned > 5
@@ -155,17 +157,3 @@ def test_last_cells_are_those_of_the_trajectories():
         found.extend(cells)
     assert np.count_nonzero(np.equal(found, UNCERTAIN)) < 0.01 * len(found)
     assert np.count_nonzero(np.equal(found, OFF_MAP)) > 50
-
-
-def test_last_cells_are_uncertain_at_a_border_and_in_sharp_turns():
-    params = RolloutParams(1.0, 0.05, 2.0, 9.0, 9.0, 9.0, 1.0, 1.0, 1.0, False, 0.1, False)
-    costmap = CostmapView(np.zeros(WINDOW.shape, np.uint8), -1.5, -1.5, 0.05)
-    tried = np.array([[0.2, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    at_rest = (0.0, 0.0, 0.0)
-
-    # On the border y = 0 of two rows, and 1 rad in the only step
-    cells = last_cells(params, costmap, (0.02, 0.0, 0.0), at_rest, tried)
-    assert cells.tolist() == [UNCERTAIN, UNCERTAIN]
-    # 0.15 m in 3 of 4 steps: x = 0.17, column 33
-    cells = last_cells(params, costmap, (0.02, 0.02, 0.0), (0.2, 0.0, 0.0), tried)
-    assert cells.tolist() == [30 * 60 + 33, UNCERTAIN]

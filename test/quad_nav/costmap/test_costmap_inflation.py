@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from costmap_maps import costs_of, drawn, picture
+from costmap_maps import costs_of
 
 from quad_nav.costmap.cost_grid import EVERYWHERE, Bounds, CostGrid, Window
 from quad_nav.costmap.inflation import InflationLayer, InflationLayerParams
@@ -37,60 +37,6 @@ def test_costs_around_a_single_obstacle():
     assert costs[1].tolist() == [253, 189, 106, 0]
     assert costs[2].tolist() == [126, 106, 70, 0]
     assert costs[3].tolist() == [63, 0, 0, 0]
-
-
-def test_the_nearer_of_two_obstacles_counts():
-    assert inflated("#.....#")[0].tolist() == [254, 253, 126, 63, 126, 253, 254]
-
-
-def test_higher_costs_stay():
-    costs = costs_of("#....")
-    costs[0, 2] = 200
-    master = CostGrid(GridSpec(5, 1, 1.0))
-    master.costs[...] = costs
-    InflationLayer(HALF_PER_METRE, 1.0, 1.0).update_costs(master, Window(0, 5, 0, 1))
-    assert master.costs[0].tolist() == [254, 253, 200, 63, 0]
-
-
-def test_unknown_cells_take_inscribed_costs_only():
-    assert picture(inflated("#????")) == drawn("#i???")
-
-
-def test_unknown_cells_take_all_costs_when_asked():
-    params = InflationLayerParams(
-        inflation_radius_m=3.0, cost_scaling_factor=math.log(2.0), inflate_unknown=True
-    )
-    assert inflated("#????", params)[0].tolist() == [254, 253, 126, 63, 255]
-
-
-def test_obstacles_reach_into_a_window_from_one_radius_around_it():
-    # The window is column 4 only. The obstacle in column 1 is 3 cells away and counts,
-    # and also changes cells outside the window; the one in column 9 is too far.
-    costs = inflated(".#.......#", window=Window(4, 5, 0, 1))
-    assert costs[0].tolist() == [253, 254, 253, 126, 63, 0, 0, 0, 0, 254]
-
-
-def test_no_obstacle_no_change():
-    assert picture(inflated(".?.\n...")) == drawn(".?.\n...")
-
-
-def test_no_radius_no_change():
-    params = InflationLayerParams(inflation_radius_m=0.0)
-    assert picture(inflated("..#..", params)) == drawn("..#..")
-
-
-def test_a_radius_below_one_cell_is_one_cell():
-    params = InflationLayerParams(inflation_radius_m=0.1)
-    assert picture(inflated("..#..", params)) == drawn(".i#i.")
-
-
-def test_first_update_is_everywhere_and_later_ones_hold_the_last():
-    layer = InflationLayer(HALF_PER_METRE, 1.0, 1.0)
-    assert layer.update_bounds(ROBOT, 0.0, Bounds(1.0, 1.0, 2.0, 2.0)) == EVERYWHERE
-    assert layer.update_bounds(ROBOT, 1.0, Bounds(4.0, 4.0, 5.0, 6.0)) == Bounds(
-        -2.0, -2.0, 8.0, 9.0
-    )
-    assert layer.update_bounds(ROBOT, 2.0, Bounds(4.0, 4.0, 5.0, 5.0)) == Bounds(1.0, 1.0, 8.0, 9.0)
 
 
 def test_new_parameters_or_footprint_redo_everything():

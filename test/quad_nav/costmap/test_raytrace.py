@@ -10,7 +10,7 @@ import pytest
 from quad_nav.costmap.cost_grid_kernel import CostmapView
 from quad_nav.costmap.observation import _make_stack
 from quad_nav.costmap.observation_kernel import Ranges, include_rays, store_observation
-from quad_nav.costmap.obstructed_cells import MAX_OBSTRUCTED, SECTORS, find_obstructed, sector_of
+from quad_nav.costmap.obstructed_cells import SECTORS
 from quad_nav.costmap.raytrace import clear_all_rays, clear_rays, mark_all_points
 
 RESOLUTION_M = 0.05
@@ -121,35 +121,3 @@ def test_points_within_range_and_height_mark():
     # The third is 1.58 m away, the fourth too high; the last is off the map and 2 m away.
     assert list(zip(*np.nonzero(costs))) == [(10, 30)]
     np.testing.assert_allclose(bounds, [0.5, 2.5, 0.51, 2.5], atol=1e-6)
-
-
-def test_sectors_go_round_once():
-    sectors = [
-        sector_of(math.cos(angle), math.sin(angle))
-        for angle in np.linspace(0.0, 2 * math.pi, 5000, endpoint=False)
-    ]
-    assert sectors[0] == 0 and sectors[-1] == SECTORS - 1
-    assert set(np.diff(sectors)) == {0, 1}
-    assert [sector_of(0.0, 2.0), sector_of(-1.0, 0.0), sector_of(0.0, -3.0)] == [
-        SECTORS // 4,
-        SECTORS // 2,
-        3 * SECTORS // 4,
-    ]
-
-
-@pytest.mark.parametrize(
-    "direction", [(0.0, 0.0), (math.nan, 1.0), (math.inf, 1.0), (1.0, -1e-300)]
-)
-def test_every_direction_has_a_sector(direction):
-    assert 0 <= sector_of(*direction) < SECTORS
-
-
-def test_obstructed_cells_of_a_window():
-    costs = np.zeros((4, 5), np.uint8)
-    costs[1, 2], costs[2, 3], costs[3, 4] = 254, 255, 1
-    found = np.zeros(3, np.int64)
-    assert find_obstructed(costs, (0, 4, 0, 4), found) == 2
-    assert found.tolist() == [7, 13, 0]
-    assert find_obstructed(costs, (0, 5, 0, 4), found) == 3
-    assert find_obstructed(costs, (0, 5, 0, 4), found[:2]) == 3
-    assert MAX_OBSTRUCTED > 0

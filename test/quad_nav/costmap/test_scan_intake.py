@@ -18,7 +18,6 @@ from quad_nav.geometry import Pose3D, Scan
 
 SOURCE = SourceParams("laser", data_type="LaserScan", expected_update_period_s=0.5)
 LIDAR = Pose3D(1.0, 2.0, 0.3)
-ELSEWHERE = Pose3D(4.0, 2.0, 0.3)
 REJECT = ScanValidatorParams()
 ACCEPT_ALL = ScanValidatorParams(reject_implausible_scans=False)
 
@@ -48,12 +47,6 @@ def observations(costmap, source="laser"):
     return costmap.layers["obstacle_layer"].buffers[source].observations
 
 
-def test_every_source_of_every_obstacle_layer_is_a_sink():
-    first, second = costmap_of(SOURCE, replace(SOURCE, name="rear")), costmap_of(SOURCE)
-    found = [(sink.costmap, sink.source.name) for sink in sinks_of((first, second))]
-    assert found == [(first, "laser"), (first, "rear"), (second, "laser")]
-
-
 def test_an_accepted_scan_reaches_every_layer():
     costmaps = costmap_of(SOURCE), costmap_of(SOURCE)
     intake = intake_of(*costmaps)
@@ -62,30 +55,6 @@ def test_an_accepted_scan_reaches_every_layer():
         (seen,) = observations(costmap)
         np.testing.assert_allclose(seen.points, [(4.0, 2.0, 0.3), (1.0, 4.0, 0.3)], atol=1e-6)
         assert seen.sensor.tolist() == [1.0, 2.0, 0.3]
-
-
-def test_a_rejected_scan_reaches_no_layer_and_its_reason_is_returned():
-    costmap = costmap_of(SOURCE)
-    intake = intake_of(costmap)
-    assert intake.add_scan(scan(1.0), at(LIDAR, intake), 1.5, 1.5) == (
-        "it is 0.50 s old, expected less than 0.50 s"
-    )
-    assert observations(costmap) == []
-
-
-def test_without_validation_every_scan_reaches_the_layers():
-    costmap = costmap_of(SOURCE)
-    intake = intake_of(costmap, params=ACCEPT_ALL)
-    assert intake.add_scan(scan(1.0), at(LIDAR, intake), 9.0, 9.0) == ""
-    assert len(observations(costmap)) == 1
-
-
-def test_validation_is_switched_while_it_runs():
-    validator = ScanValidator(ACCEPT_ALL)
-    intake = ScanIntake(sinks_of([costmap_of(SOURCE)]), ScanFilters([validator]), "map")
-    assert intake.add_scan(scan(1.0), at(LIDAR, intake), 9.0, 9.0) == ""
-    validator.params = REJECT
-    assert intake.add_scan(scan(1.0), at(LIDAR, intake), 9.0, 9.0) != ""
 
 
 def test_reset_forgets_earlier_scans():
@@ -118,21 +87,6 @@ def test_layers_that_see_a_scan_alike_share_its_projection():
     assert len(first.points) == 2 and len(third.points) == 0
 
 
-def test_layers_in_other_frames_or_with_other_origins_do_not_share():
-    costmaps = costmap_of(SOURCE), costmap_of(SOURCE), costmap_of(SOURCE)
-    intake = intake_of(*costmaps)
-    poses = [
-        SensorPose(LIDAR, LIDAR),
-        SensorPose(ELSEWHERE, ELSEWHERE),
-        SensorPose(LIDAR, ELSEWHERE),
-    ]
-    intake.add_scan(scan(), poses, 0.0, 0.0)
-    first, second, third = (observations(costmap)[0] for costmap in costmaps)
-    np.testing.assert_allclose(second.points - first.points, [(3.0, 0.0, 0.0)] * 2, atol=1e-6)
-    np.testing.assert_array_equal(third.points, first.points)
-    assert third.sensor.tolist() == [4.0, 2.0, 0.3]
-
-
 def test_a_late_scan_that_the_first_layer_no_longer_keeps_still_reaches_the_second():
     brief = replace(SOURCE, observation_persistence_s=0.1)
     lasting = replace(SOURCE, observation_persistence_s=1.0)
@@ -140,21 +94,6 @@ def test_a_late_scan_that_the_first_layer_no_longer_keeps_still_reaches_the_seco
     intake = intake_of(*costmaps, params=ACCEPT_ALL)
     intake.add_scan(scan(1.0), at(LIDAR, intake), 1.3, 1.3)
     assert [len(observations(costmap)) for costmap in costmaps] == [0, 1]
-
-
-def test_a_cloud_is_shared_too():
-    costmaps = costmap_of(SOURCE), costmap_of(SOURCE)
-    intake = intake_of(*costmaps)
-    points = np.array([[3.0, 0.0, 0.0]], dtype=np.float32)
-    intake.add_cloud(points, at(LIDAR, intake), 0.0, 0.0)
-    first, second = (observations(costmap)[0] for costmap in costmaps)
-    assert first is second
-    np.testing.assert_allclose(first.points, [(4.0, 2.0, 0.3)], atol=1e-6)
-
-
-def test_a_robot_without_obstacle_layers_takes_every_scan():
-    intake = intake_of(LayeredCostmap(CostmapParams(layers=())))
-    assert intake.add_scan(scan(1.0), [], 9.0, 9.0) == ""
 
 
 def test_expected_period_is_that_of_the_strictest_source():

@@ -77,10 +77,6 @@ def call(package: Path, monkeypatch):
     return kernel(20), sum(kernel.stats.cache_hits.values()) == 1
 
 
-def test_kernels_are_cached(package, monkeypatch):
-    assert [call(package, monkeypatch), call(package, monkeypatch)] == [(41, False), (41, True)]
-
-
 @pytest.mark.parametrize("factor, more, result", [(2, 5, 45), (3, 1, 61)])
 def test_a_kernel_is_compiled_anew_when_another_module_changes(
     package, monkeypatch, factor, more, result
@@ -128,10 +124,6 @@ def test_without_a_folder_kernels_run_and_the_cost_is_told(package, monkeypatch,
     assert "/a: Permission denied; /b: is open" in second and "takes about 60 s" in second
 
 
-def test_nothing_is_told_with_a_cache(package):
-    assert kernel_cache.cache_warnings() == []
-
-
 def modules_with_kernels():
     return [
         path for path in kernel_cache.SOURCES.rglob("*.py") if "import njit" in path.read_text()
@@ -166,15 +158,12 @@ def temporary(places) -> Path:
     return places / "tmp" / f"quad-nav-{os.geteuid()}"
 
 
-def test_sources_come_first(tmp_path, monkeypatch):
+def test_folder_of_numba_comes_first_and_then_the_sources(tmp_path, monkeypatch):
     monkeypatch.setattr(kernel_cache, "_PACKAGE", tmp_path)
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    assert kernel_cache.find_cache_folder() == (tmp_path / "__pycache__" / "kernels", [])
-
-
-def test_folder_of_numba_is_used(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "given"))
     assert kernel_cache.find_cache_folder() == (tmp_path / "given", [])
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    assert kernel_cache.find_cache_folder() == (tmp_path / "__pycache__" / "kernels", [])
 
 
 def test_read_only_sources_and_no_home_use_the_temporary_folder(places, monkeypatch):
@@ -206,7 +195,7 @@ def test_folder_of_another_user_is_refused(places, monkeypatch):
     assert f"belongs to user {os.getuid()}, not to this user" in problems[-1]
 
 
-@pytest.mark.parametrize("mode", [0o770, 0o707, 0o755, 0o711])
+@pytest.mark.parametrize("mode", [0o770, 0o707, 0o711])
 def test_folder_that_is_open_to_others_is_refused(places, mode):
     temporary(places).mkdir()
     temporary(places).chmod(mode)
@@ -214,14 +203,12 @@ def test_folder_that_is_open_to_others_is_refused(places, mode):
     assert folder is None and "is open to other users" in problems[-1]
 
 
-def test_link_is_refused(places):
+def test_link_and_folder_that_others_can_replace_are_refused(places):
     (places / "elsewhere").mkdir(mode=0o700)
     temporary(places).symlink_to(places / "elsewhere")
     folder, problems = user_cache_folder("x")
     assert folder is None and "is no folder" in problems[-1]
-
-
-def test_folder_that_others_can_replace_is_refused(places):
+    temporary(places).unlink()
     (places / "tmp").chmod(0o777)  # no sticky bit: whoever writes there can rename
     folder, problems = user_cache_folder("x")
     assert folder is None and "other users can replace it" in problems[-1]

@@ -91,13 +91,10 @@ def test_names_that_no_file_can_have():
 def test_goal_files_have_limits():
     goals = "[1, 2]," * MAX_GOALS
     assert len(parse_goals(f'{{"goals": [{goals[:-1]}]}}', "f").goals) == MAX_GOALS
-    assert refusal(parse_goals, f'{{"goals": [{goals}[1, 2]]}}', "f") == (
-        f"f: goals: are {MAX_GOALS + 1}; expected {MAX_GOALS} at most"
-    )
+    assert "expected 10000 at most" in refusal(parse_goals, f'{{"goals": [{goals}[1, 2]]}}', "f")
     assert "bytes; expected" in refusal(parse_goals, " " * (MAX_BYTES + 1), "f")
-    assert "x is 1e+07; expected 1e+06 metres at most" in refusal(
-        parse_goals, '{"goals": [[1e7, 1]]}', "f"
-    )
+    far = '{"goals": [[1e7, 1]]}'
+    assert "x is 1e+07; expected 1e+06 metres at most" in refusal(parse_goals, far, "f")
 
 
 def test_a_watched_file_that_becomes_a_pipe_is_a_changed_file(tmp_path):
@@ -156,14 +153,14 @@ def test_a_scene_refers_to_no_file_outside_its_folder(folder, way):
     assert f"leads out of {folder}" in refusal(load_scene, scene(folder, name))
 
 
-def test_a_scene_reaches_files_below_its_folder(folder):
-    (folder.parent / "secret.world").rename(folder / "sub" / "own.world")
-    assert len(load_scene(scene(folder, "sub/own.world")).obstacles) == 1
-
-
-def test_folders_that_the_user_allows_may_be_referred_to(folder, monkeypatch):
+def test_a_scene_reaches_files_below_its_folder_and_in_folders_that_are_allowed(
+    folder, monkeypatch
+):
     monkeypatch.setenv("QUAD_FILES_PATH", f"/none{os.pathsep}{folder.parent}")
     assert len(load_scene(scene(folder, "../secret.world")).obstacles) == 1
+    monkeypatch.delenv("QUAD_FILES_PATH")
+    (folder.parent / "secret.world").rename(folder / "sub" / "own.world")
+    assert len(load_scene(scene(folder, "sub/own.world")).obstacles) == 1
 
 
 def test_a_map_refers_to_no_image_outside_its_folder(folder):

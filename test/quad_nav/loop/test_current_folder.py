@@ -48,7 +48,7 @@ class Group(NavigatorGroup):
 
 if __name__ == "__main__":
     setup = offline_setup(read_setup(FlightOptions(None, Path({goals!r}), "tutorial")))
-    loop = FlightLoop(setup, [(0,), (1,)], Group, start_method={method!r})
+    loop = FlightLoop(setup, [(0,), (1,)], Group, start_method="forkserver")
     loop.start()
     loop.workers[0].reset(0.0, 0, False)
     loop.close()
@@ -97,19 +97,13 @@ def run_script(folder, text):
     return run(folder, sys.executable, script)
 
 
-def test_the_files_run_where_a_program_is_started_with_minus_m(tmp_path):
-    (tmp_path / "yaml.py").write_text("print('ran')")
-    assert "ran" in run(tmp_path, sys.executable, "-m", "yaml")
-
-
 def test_workers_of_a_study(mission):
     expected = [(0, ("a", str(mission), "1")), (1, ("b", str(mission), "1"))]
     assert run_script(mission, STUDY) == f"{expected}\nFalse\n"
 
 
-@pytest.mark.parametrize("method", ["spawn", "forkserver", "fork"])
-def test_navigators_in_other_processes(mission, method):
-    text = NAVIGATORS.format(method=method, goals=str(ROOT / "goals"))
+def test_navigators_in_other_processes(mission):
+    text = NAVIGATORS.format(goals=str(ROOT / "goals"))
     assert run_script(mission, text) == f"{mission}\n"
 
 

@@ -15,7 +15,6 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.loop import offline_setup, shares_of, worker_process
 from quad_nav.loop.flight_loop import FlightLoop
 from quad_nav.loop.navigator_group import NavigatorGroup
-from quad_nav.loop.worker_process import WorkerProcessError
 from quad_nav.peers.peer import Intention
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.lidar import LidarParams
@@ -27,17 +26,9 @@ GOALS = (Pose2D(3.0, 1.5), Pose2D(1.5, 4.0))
 
 @pytest.fixture(scope="module")
 def setup():
-    lidar = LidarParams(step_size_rad=2 * np.pi / 64)
-    return offline_setup(
-        read_setup(
-            FlightOptions(
-                ROOT / "scenes" / "arena.yaml",
-                ROOT / "goals",
-                "tutorial",
-                simulation=SimulationParams(lidar),
-            )
-        )
-    )
+    simulation = SimulationParams(LidarParams(step_size_rad=2 * np.pi / 64))
+    files = ROOT / "scenes" / "arena.yaml", ROOT / "goals", "tutorial"
+    return offline_setup(read_setup(FlightOptions(*files, simulation=simulation)))
 
 
 def fly(loop: FlightLoop, periods: int) -> list:
@@ -119,9 +110,7 @@ def test_single_steps_give_the_same_flight(setup):
 
 def test_planners_of_a_group_share_their_working_memory(setup):
     loop = FlightLoop(setup, [(0, 1)])
-
     first, second = (robot.navigator.planner for robot in loop.group.robots.values())
-
     loop.close()
     assert first.wave is second.wave
 
@@ -167,14 +156,6 @@ def test_a_group_of_a_shell_runs_in_every_process(setup, method):
     loop.close()
     assert states == {0: "controlling", 1: "controlling"}
     assert notes == ["parked", "parked"]
-
-
-def test_without_a_receiver_a_lost_worker_process_is_an_error(setup):
-    loop = started(setup, [(0,), (1,)])
-    os.kill(loop.workers[0].pid, signal.SIGKILL)
-    with pytest.raises(WorkerProcessError, match="it has ended"):
-        fly(loop, 40)
-    loop.close()
 
 
 def test_a_lost_worker_process_is_reported_and_its_robot_hovers_until_there_is_another(setup):

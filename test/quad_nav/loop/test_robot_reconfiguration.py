@@ -36,16 +36,6 @@ def assert_follows(robot):
             assert buffer.params.expected_update_period_s == 0.2
 
 
-def test_every_part_follows_python():
-    with quad_nav.Flight(setup_of()) as flight:
-        flight.reconfigure(0, EVERY)
-        for _ in range(120):
-            flight.step()
-        robots = flight._loop.offline_robots
-        assert_follows(robots[0])
-        assert robots[1].navigator.params.sensor_timeout_s == 0.5
-
-
 def test_no_part_follows_a_refused_change():
     with quad_nav.Flight(setup_of()) as flight:
         with pytest.raises(InputError, match="sensor_timeout"):

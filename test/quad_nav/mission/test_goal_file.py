@@ -111,109 +111,67 @@ def test_goals_at_one_place_are_a_loop_if_they_differ_in_yaw():
 @pytest.mark.parametrize(
     "content, problem",
     [
-        ('{"goals": [[1,2],]}', "f.json:1:18: is not JSON: Expecting value"),
-        ('{"goals":\n [[1,2]\n', "f.json:3:1: is not JSON: Expecting ',' delimiter"),
-        ('"goals": [[1,2],]', "f.json:1:17: is not JSON: Expecting value"),
-        ("", "f.json:1:1: is not JSON: Expecting value"),
-        (b"\xff", "f.json: byte 0 is not UTF-8"),
-        ("[" * 100000, "f.json: is nested too deeply"),
-        ("[[1, 2]]", "f.json: is a list; expected {"),
-        ("{}", "f.json: has no goals"),
-        ('{"goals": 3}', "f.json: goals: is 3; expected a list"),
-        ('{"goals": []}', "f.json: goals: is empty; expected at least one goal"),
-        ('{"goals": [5]}', "f.json: goals[0] (goal 1): is 5; expected [x, y] or [x, y, yaw]"),
-        ('{"goals": [[1]]}', "f.json: goals[0] (goal 1): has 1 numbers; expected [x, y]"),
-        ('{"goals": [[1, 2, 3, 4]]}', "f.json: goals[0] (goal 1): has 4 numbers; expected [x, y]"),
-        (
-            '{"goals": [[1, true]]}',
-            "f.json: goals[0] (goal 1): y is true; expected a finite number",
-        ),
-        ('{"goals": [["1", 2]]}', 'f.json: goals[0] (goal 1): x is "1"; expected a finite number'),
-        ('{"goals": [[NaN, 2]]}', "f.json: goals[0] (goal 1): x is NaN; expected a finite number"),
-        ('{"goals": [[1, -Infinity]]}', "f.json: goals[0] (goal 1): y is -Infinity; expected"),
-        ('{"goals": [[1e999, 2]]}', "f.json: goals[0] (goal 1): x is Infinity; expected"),
-        ('{"goals": [[1' + "0" * 5000 + ", 2]]}", "f.json: goals[0] (goal 1): x is Infinity"),
-        (
-            '{"goals": [[1, 2, 90]]}',
-            (
-                "f.json: goals[0] (goal 1): yaw is 90; expected radians between "
-                "-2 pi and 2 pi (90 degrees are 1.571)"
-            ),
-        ),
-        (
-            '{"goals": [{"x": 1, "y": 2, "altitude": 3}]}',
-            "f.json: goals[0] (goal 1): altitude cannot be set for a goal: all quadcopters fly at "
-            "the scene's altitude; expected none here, and altitude in the scene file",
-        ),
-        ('{"goals": [{"x": 1, "y": 2, "Z": 0}]}', "f.json: goals[0] (goal 1): Z cannot be set"),
-        ('{"goals": [[1, 2]], "altitude": 2}', "f.json: altitude cannot be set for a goal: all"),
-        (
-            '{"goals": [{"x": 1, "y": 2, "wait": 3}]}',
-            "f.json: goals[0] (goal 1): wait is not a key of goals; expected wait_s",
-        ),
-        (
-            '{"goals": [{"x": 1}]}',
-            "f.json: goals[0] (goal 1): has no y; expected a number of metres",
-        ),
-        (
-            '{"goals": [{"x": null, "y": 2}]}',
-            "f.json: goals[0] (goal 1): x is null; expected a finite number of metres",
-        ),
-        (
-            '{"goals": [{"x": 1, "y": 2, "wait_s": -1}]}',
-            "f.json: goals[0] (goal 1): wait_s is -1; expected a number of seconds, 0 to 1e+09",
-        ),
-        (
-            '{"goals": [{"x": 1, "y": 2, "tolerance": null}]}',
-            "f.json: goals[0] (goal 1): tolerance is null; expected a number of metres above 0",
-        ),
-        (
-            '{"goals": [{"x": 1, "y": 2, "yaw": 0, "yaw_tolerance": 4}]}',
-            "f.json: goals[0] (goal 1): yaw_tolerance is 4; expected a number of radians above 0",
-        ),
-        (
-            '{"goals": [{"x": 1, "y": 2, "yaw": null, "yaw_tolerance": 1}]}',
-            "f.json: goals[0] (goal 1): yaw_tolerance has no effect without a yaw; expected a yaw",
-        ),
-        (
-            '{"goals": [{"x": 1, "y": 2, "yaw": "north"}]}',
-            'f.json: goals[0] (goal 1): yaw is "north"; expected a finite number of radians',
-        ),
-        ('{"goals": [{"x": 1, "x": 1, "y": 2}]}', "f.json: x: is given twice; expected once"),
-        ('{"goals": [[1, 2]], "goals": [[3, 4]]}', "f.json: goals: is given twice; expected once"),
-        (
-            '{"goals": [[1, 2]], "Retrys": 1}',
-            "f.json: Retrys: is not a key of goal files; expected retries",
-        ),
-        (
-            '{"goals": [[1, 2]], "zzz": 1}',
-            "f.json: zzz: is not a key of goal files; expected one of goals, $schema,",
-        ),
-        ('{"goals": [[1, 2]], "$schema": 1}', "f.json: $schema: is 1; expected a string"),
-        ('{"goals": [[1, 2]], "loop": 1}', "f.json: loop: is 1; expected true or false"),
-        ('{"goals": [[1, 2]], "retries": 1.5}', "f.json: retries: is 1.5; expected a whole number"),
-        ('{"goals": [[1, 2]], "retries": -1}', "f.json: retries: is -1; expected a whole number"),
-        (
-            '{"goals": [[1, 2]], "goal_tolerance": 0}',
-            "f.json: goal_tolerance: is 0; expected a number",
-        ),
-        (
-            '{"goals": [[1, 2]], "goal_timeout": NaN}',
-            "f.json: goal_timeout: is NaN; expected a number",
-        ),
+        ('{"goals":\n [[1,2]\n', ":3:1: is not JSON: Expecting ',' delimiter"),
+        ('"goals": [[1,2],]', ":1:17: is not JSON: Expecting value"),
+        (b"\xff", ": byte 0 is not UTF-8"),
+        ("[" * 100000, ": is nested too deeply"),
+        ("[[1, 2]]", ": is a list; expected {"),
+        ("{}", ": has no goals"),
+        ('{"goals": 3}', ": goals: is 3; expected a list"),
+        ('{"goals": []}', ": goals: is empty; expected at least one goal"),
+        ('{"goals": [[1, 2]], "goals": [[3, 4]]}', ": goals: is given twice; expected once"),
+        ('{"goals": [[1, 2]], "altitude": 2}', ": altitude cannot be set for a goal: all"),
+        ('{"goals": [[1, 2]], "Retrys": 1}', ": Retrys: is not a key of goal files; expected ret"),
+        ('{"goals": [[1, 2]], "zzz": 1}', ": zzz: is not a key of goal files; expected one of"),
+        ('{"goals": [[1, 2]], "$schema": 1}', ": $schema: is 1; expected a string"),
+        ('{"goals": [[1, 2]], "loop": 1}', ": loop: is 1; expected true or false"),
+        ('{"goals": [[1, 2]], "retries": 1.5}', ": retries: is 1.5; expected a whole number"),
+        ('{"goals": [[1, 2]], "goal_timeout": NaN}', ": goal_timeout: is NaN; expected a number"),
         (
             '{"goals": [[1, 2], [1, 2.8]], "loop": true}',
-            (
-                "f.json: loop: all goals are reached at one position; expected two goals more "
-                "than twice the goal_tolerance apart (0.8 m)"
-            ),
+            ": loop: all goals are reached at one position; expected two goals more than twice the"
+            " goal_tolerance apart (0.8 m)",
         ),
     ],
 )
 def test_each_fault_has_its_place_and_what_was_expected(content, problem):
-    problems = faults(content)
-    assert len(problems) == 1
-    assert problems[0].startswith(problem)
+    (found,) = faults(content)
+    assert found.startswith(f"f.json{problem}")
+
+
+@pytest.mark.parametrize(
+    "goal, problem",
+    [
+        ("5", "is 5; expected [x, y] or [x, y, yaw]"),
+        ("[1, 2, 3, 4]", "has 4 numbers; expected [x, y]"),
+        ("[1, true]", "y is true; expected a finite number"),
+        ("[NaN, 2]", "x is NaN; expected a finite number"),
+        ("[1" + "0" * 5000 + ", 2]", "x is Infinity"),
+        (
+            "[1, 2, 90]",
+            "yaw is 90; expected radians between -2 pi and 2 pi (90 degrees are 1.571)",
+        ),
+        (
+            '{"x": 1, "y": 2, "Z": 0}',
+            "Z cannot be set for a goal: all quadcopters fly at the scene",
+        ),
+        ('{"x": 1, "y": 2, "wait": 3}', "wait is not a key of goals; expected wait_s"),
+        ('{"x": 1}', "has no y; expected a number of metres"),
+        (
+            '{"x": 1, "y": 2, "wait_s": -1}',
+            "wait_s is -1; expected a number of seconds, 0 to 1e+09",
+        ),
+        ('{"x": 1, "y": 2, "tolerance": null}', "tolerance is null; expected a number of metres a"),
+        (
+            '{"x": 1, "y": 2, "yaw": null, "yaw_tolerance": 1}',
+            "yaw_tolerance has no effect without a yaw; expected a yaw",
+        ),
+        ('{"x": 1, "y": 2, "yaw": "north"}', 'yaw is "north"; expected a finite number of radians'),
+    ],
+)
+def test_each_fault_of_a_goal_has_its_number(goal, problem):
+    (found,) = faults(f'{{"goals": [{goal}]}}')
+    assert found.startswith(f"f.json: goals[0] (goal 1): {problem}")
 
 
 def test_all_faults_are_listed_at_once():

@@ -85,28 +85,6 @@ def test_a_robot_is_due_at_its_goal_and_at_its_time_out():
     assert watch.due(0.1, near) == [0]
 
 
-def test_poses_that_are_added_together_count_as_one_after_the_other():
-    random = np.random.default_rng(3)
-    steps = random.normal(0.0, [0.004, 0.004, 0.02], (500, 2, 3))
-    poses = np.cumsum(steps, axis=0)
-    poses[:, 1, 0] += 5.0 - np.sin(np.linspace(0.0, 9.0 * math.pi, 500))
-    poses[100:300, :, :2] = poses[100, :, :2]  # they turn on the spot
-    stamps_s = [k * PERIOD_S for k in range(500)]
-    single, together = (FlightLog(["quad0", "quad1"], 0.3) for _ in range(2))
-    for log in (single, together):
-        for robot in log.robots.values():
-            robot.add_action(SendGoal(0, 1, Pose2D(1.0, 0.0), 1))
-    for stamp_s, both in zip(stamps_s, poses):
-        for name, pose in zip(single.robots, both.tolist()):
-            single.add_pose(name, stamp_s, Pose2D(*pose))
-    for first, last in ((0, 1), (1, 400), (400, 500)):
-        together.add_tracks(stamps_s[first:last], poses[first:last])
-    for name in single.robots:
-        assert together.robots[name].state == single.robots[name].state
-        assert together.distances.min_separation_m(name) == single.distances.min_separation_m(name)
-    assert single.robots["quad0"].spin_s > 1.0
-
-
 def test_a_step_of_known_length_and_turn():
     """0.3 m in a second, then half a turn on the spot in two seconds."""
     log = RobotLog("quad0")

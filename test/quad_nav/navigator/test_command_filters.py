@@ -9,7 +9,6 @@ from test_navigator import FORWARD, GOAL, HERE, FakeRecovery, Flight
 from upstream import UPSTREAM
 
 from quad_nav import config
-from quad_nav.costmap.scan_filter import FilteredScan
 from quad_nav.errors import InputError
 from quad_nav.geometry import Twist2D
 from quad_nav.navigator.command_filter import Command, CommandFilter, StopReason, VoronoiCell
@@ -102,16 +101,6 @@ def test_a_filter_can_ask_why_a_command_is_a_stop(what, reason):
     assert reason in stops and reason in [one.stop for one in watches.given]
 
 
-def test_a_cancelled_goal_is_a_stop():
-    watches = Replaces(None)
-    flight = flight_with(watches)
-    flight.navigator.set_goal(GOAL, 0.0)
-    ticks(flight, 0.5)
-    flight.navigator.cancel()
-    (stop,) = [tick for tick in ticks(flight, 0.5) if tick.command]
-    assert stop.stop is StopReason.CANCELLED and stop.command == Twist2D()
-
-
 def no_scans(flight):
     flight.local_costmap.stale = [("obstacle_layer/base_scan", 1.3)]
     return BOTH
@@ -189,15 +178,6 @@ def test_the_voronoi_cell_names_the_peer_that_limits():
     assert "quad1" in {tick.limited_by for tick in found if tick.command}
 
 
-def test_a_clock_that_jumps_back_resets_the_filters():
-    watches = Replaces(None)
-    flight = flight_with(watches)
-    for costmap in (flight.global_costmap, flight.local_costmap):
-        costmap.reset_layers = lambda now_s: None
-    flight.navigator.restart(0.0)
-    assert watches.resets == 1
-
-
 @pytest.mark.parametrize(
     "entries, problem",
     [
@@ -220,7 +200,3 @@ def test_the_default_lists_have_the_filters_of_the_core():
     assert configuration.scan_filters == (("validator", "quad/ScanValidator"),)
     assert configuration.command_filters == (("peers", "quad/VoronoiCell"),)
     assert config.load({"command_filters": []}).command_filters == ()
-
-
-def test_a_filtered_scan_has_nothing_masked():
-    assert FilteredScan(None).masked is None and len(FilteredScan(None).vacated) == 0

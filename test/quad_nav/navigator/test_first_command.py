@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 from test_navigator import FORWARD, GOAL, FakeRecovery, Flight, outcomes
 from upstream import UPSTREAM
@@ -78,20 +76,6 @@ class TestFromGoalToMotion:
         assert first_motion_s(ticks) - taken_s == pytest.approx(periods / rate_hz)
 
 
-@pytest.mark.parametrize("tree, motion_s", [(UPSTREAM, 1.3), (FIXED, 1.2)])
-def test_after_a_recovery_that_takes_no_time(tree, motion_s):
-    """The search fails for more than 1 s at 1.1 s; the next cycle plans."""
-    flight = Flight([NamedRecovery("r", FakeRecovery())], tree, planner_patience_s=1.0)
-    flight.planner.fails = True
-    flight.navigator.set_goal(GOAL, 0.0)
-    ticks = flight.until(1.15)
-    assert [tick.now_s for tick in ticks if tick.recovery] == pytest.approx([1.1])
-    flight.planner.fails = False
-    ticks = flight.until(2.0)
-    assert [1.2] == plans(ticks)
-    assert first_motion_s(ticks) == pytest.approx(motion_s)
-
-
 def test_upstream_delays_its_cycles_by_a_rotation():
     """Fifty steps from 1.1 s on; the last one, at 3.55 s, is followed by a cycle and a plan."""
     flight = Flight([NamedRecovery("turn", FakeRecovery(steps=50))], planner_patience_s=1.0)
@@ -115,34 +99,6 @@ def test_a_periodic_plan_is_followed_from_the_next_cycle_on(tree, followed):
         flight.until(end_s)
         counts.append(len(flight.controller.plans))
     assert counts == followed
-
-
-@pytest.mark.parametrize("tree, motion_s", [(UPSTREAM, 1.5), (FIXED, 1.5)])
-def test_a_plan_found_after_failures_is_followed_in_the_same_cycle(tree, motion_s):
-    """Upstream's thread repeats a failed search without a pause, so it ends before a cycle."""
-    flight = Flight(tree=tree)
-    flight.planner.fails = True
-    flight.navigator.set_goal(GOAL, 0.0)
-    flight.until(1.45)
-    flight.planner.fails = False
-    ticks = flight.until(2.0)
-    assert [motion_s] == plans(ticks)
-    assert first_motion_s(ticks) == pytest.approx(motion_s)
-
-
-@pytest.mark.parametrize("tree, searches_s", [(UPSTREAM, [1.0, 1.5]), (FIXED, [1.5])])
-def test_a_failed_command_is_followed_by_a_new_plan(tree, searches_s):
-    """One command is missing either way; upstream plans in the cycle that failed."""
-    flight = Flight(tree=tree, controller_frequency_hz=2.0)
-    flight.navigator.set_goal(GOAL, 0.0)
-    flight.until(0.95)
-    flight.controller.fails = True
-    ticks = flight.until(1.0)
-    flight.controller.fails = False
-    ticks += flight.until(1.9)
-    assert searches_s[:1] == plans(ticks)
-    assert [1.0] == commands(ticks, STOP)
-    assert [1.5] == commands(ticks)
 
 
 @pytest.mark.parametrize("tree, recovers", [(UPSTREAM, False), (FIXED, True)])
@@ -176,15 +132,3 @@ def test_a_new_goal_without_a_plan_over_an_active_one(tree, first_stop_s):
     assert next(t.now_s for t in ticks if t.command == STOP) == pytest.approx(first_stop_s)
     assert outcomes(ticks) == [(False, Trigger.PLANNING.value)]
     assert commands(ticks) == []
-
-
-def test_the_order_changes_in_flight():
-    """With a planner frequency: plans go on after the change, and so do commands."""
-    flight = Flight(tree=FIXED, planner_frequency_hz=1.0)
-    flight.navigator.set_goal(GOAL, 0.0)
-    flight.until(1.5)
-    for on, end_s in ((False, 4.5), (True, 7.5)):
-        flight.navigator.set_params(replace(flight.navigator.params, command_in_first_cycle=on))
-        ticks = flight.until(end_s)
-        assert len([tick for tick in ticks if tick.plan is not None]) in (3, 4)
-        assert len([tick for tick in ticks if tick.command == FORWARD]) == 30

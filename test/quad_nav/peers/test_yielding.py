@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from quad_nav.config import load, updated
+from quad_nav.config import load
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.grid import LETHAL
 from quad_nav.navigator.tick import RobotPoses, State
-from quad_nav.peers.peer import HIGHEST_PRIORITY, Intention, idle_priority, peer_at
+from quad_nav.peers.peer import HIGHEST_PRIORITY, Intention, peer_at
 from quad_nav.scenario.assembly import apply_configuration, build_navigator
 
 STEP_S = 0.1
@@ -105,26 +105,6 @@ def test_head_on_one_robot_goes_straight_and_the_other_passes_beside_it():
     assert fleet.nearest_m > 2 * RADIUS_M
 
 
-def test_without_avoid_peers_they_do_not_avoid_each_other():
-    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(8.0, 5.0, math.pi), peers={"avoid_peers": False})
-    fleet.navigators[0].set_goal(Pose2D(8.0, 5.0), 0.0)
-    fleet.navigators[1].set_goal(Pose2D(2.0, 5.0), 0.0)
-    fleet.fly(20.0)
-    assert fleet.yielded == [False, False]
-    assert fleet.nearest_m < RADIUS_M
-
-
-def test_avoid_peers_can_be_switched_off_in_flight():
-    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(3.0, 5.0, math.pi))
-    fleet.navigators[0].set_goal(Pose2D(8.0, 5.0), 0.0)
-    fleet.fly(1.0)
-    assert len(fleet.navigators[0].peers.peers) == 1
-    off = updated(load({**TREE, "robot": 0}), "peers", {"avoid_peers": False})
-    apply_configuration(fleet.navigators[0], off)
-    fleet.fly(0.5)
-    assert fleet.navigators[0].peers.peers == []
-
-
 def test_an_idle_robot_on_a_goal_makes_room_and_returns():
     fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(6.0, 5.0))
     fleet.navigators[0].set_goal(Pose2D(6.0, 5.0), 0.0)
@@ -137,24 +117,6 @@ def test_an_idle_robot_on_a_goal_makes_room_and_returns():
     assert fleet.navigators[1].state is State.IDLE
     assert fleet.outcomes[1] == []  # it had no goal of its own
     assert fleet.nearest_m > 2 * RADIUS_M
-
-
-def test_without_yield_when_idle_an_idle_robot_stays():
-    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(6.0, 5.0), peers={"yield_when_idle": False})
-    fleet.navigators[0].set_goal(Pose2D(6.0, 5.0), 0.0)
-    fleet.fly(25.0)
-    assert fleet.poses[1] == Pose2D(6.0, 5.0)
-    assert fleet.nearest_m > 2 * RADIUS_M
-
-
-def test_a_goal_ends_a_yielding_manoeuvre():
-    fleet = Fleet(Pose2D(3.5, 5.0), Pose2D(6.0, 5.0))
-    fleet.navigators[0].set_goal(Pose2D(6.0, 5.0), 0.0)
-    fleet.fly(20.0, until=lambda: fleet.yielded[1])
-    fleet.navigators[1].set_goal(Pose2D(8.0, 8.0), fleet.now_s)
-    fleet.fly(60.0, until=lambda: fleet.outcomes[1])
-    assert fleet.outcomes[1][0].succeeded
-    assert fleet.poses[1].distance_to(Pose2D(8.0, 8.0)) < 0.2
 
 
 def test_a_robot_without_progress_gives_up_its_priority():
@@ -188,24 +150,6 @@ def test_a_lost_peer_is_logged_once():
     ]
 
 
-@pytest.mark.parametrize("age_s, is_marked", [(0.0, False), (5.0, True)])
-def test_obstacle_layers_ignore_points_on_a_known_peer(age_s, is_marked):
-    source = {
-        "observation_sources": "scan",
-        "obstacle_range": 5.0,
-        "scan": {"data_type": "LaserScan", "marking": True, "max_obstacle_height": 2.0},
-    }
-    navigator = build_navigator(load({"global_costmap": source, "local_costmap": source}))
-    here = Pose2D(5.0, 5.0)
-    seen = [peer_at("quad1", Pose2D(7.0, 5.0), Twist2D(), 10.0 - age_s)]
-    navigator.tick(10.0, RobotPoses(here, here), Twist2D(), seen)
-    scan = Scan(10.0, 0.0, 0.01, 0.02, 60.0, np.full(2, 1.7, dtype=np.float32))
-    layer = navigator.global_costmap.layers["obstacle_layer"]
-    layer.add_scan("scan", scan, Pose3D(5.0, 5.0, 1.0), 10.0)
-    navigator.global_costmap.update(10.0, here)
-    assert (layer.grid.costs == LETHAL).any() == is_marked
-
-
 def test_marks_of_a_peer_are_cleared_when_it_becomes_known():
     source = {
         "observation_sources": "scan",
@@ -225,28 +169,6 @@ def test_marks_of_a_peer_are_cleared_when_it_becomes_known():
     navigator.tick(1.0, RobotPoses(here, here), Twist2D(), seen)
     navigator.global_costmap.update(1.0, here)
     assert not (layer.grid.costs == LETHAL).any()
-
-
-def test_the_reach_covers_the_obstacle_range():
-    source = {"observation_sources": "scan", "scan": {"obstacle_range": 9.0, "marking": True}}
-    far = build_navigator(load({"global_costmap": source}))
-    near = build_navigator(load({}))
-    assert far.peers.reach_m > 9.0 + 2 * RADIUS_M > near.peers.reach_m > 2 * 0.3 * 7.0
-
-
-def test_intention_of_a_robot():
-    navigator = build_navigator(load({**TREE, "robot": 3}))
-    idle = navigator.peers.intention
-    assert idle.priority == idle_priority(3) == -4.0e9 - 0.03 and not len(idle.path)
-    here = Pose2D(2.0, 5.0)
-    navigator.set_goal(Pose2D(4.0, 5.0), 7.0)
-    navigator.tick(7.0, RobotPoses(here, here), Twist2D())
-    intention = navigator.peers.intention
-    assert intention.priority == pytest.approx(-7.03)
-    assert len(intention.path) == pytest.approx(21, abs=2)  # 2 m, a point every 0.1 m
-    np.testing.assert_allclose(intention.path[-1], [4.0, 5.0])
-    navigator.cancel()
-    assert not len(navigator.peers.intention.path)
 
 
 def test_a_stationary_peer_is_an_obstacle_whatever_its_intention():
@@ -279,3 +201,22 @@ def test_an_idle_robot_makes_room_for_a_peer_that_it_blocks():
     fleet.fly(60.0, until=lambda: bool(fleet.outcomes[1]))
     assert [outcome.succeeded for outcome in fleet.outcomes[1]] == [True]
     assert fleet.nearest_m > 2 * RADIUS_M
+
+
+def test_without_avoid_peers_they_do_not_avoid_each_other():
+    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(8.0, 5.0, math.pi), peers={"avoid_peers": False})
+    fleet.navigators[0].set_goal(Pose2D(8.0, 5.0), 0.0)
+    fleet.navigators[1].set_goal(Pose2D(2.0, 5.0), 0.0)
+    fleet.fly(20.0)
+    assert fleet.yielded == [False, False]
+    assert fleet.nearest_m < RADIUS_M
+
+
+def test_a_goal_ends_a_yielding_manoeuvre():
+    fleet = Fleet(Pose2D(3.5, 5.0), Pose2D(6.0, 5.0))
+    fleet.navigators[0].set_goal(Pose2D(6.0, 5.0), 0.0)
+    fleet.fly(20.0, until=lambda: fleet.yielded[1])
+    fleet.navigators[1].set_goal(Pose2D(8.0, 8.0), fleet.now_s)
+    fleet.fly(60.0, until=lambda: fleet.outcomes[1])
+    assert fleet.outcomes[1][0].succeeded
+    assert fleet.poses[1].distance_to(Pose2D(8.0, 8.0)) < 0.2

@@ -37,23 +37,10 @@ def test_straight_to_a_free_goal():
     assert plan_of(FIELD, START, GOAL).tolist() == [[0.5, 1.5, 0.0], [10.5, 1.5, 0.0]]
 
 
-def test_a_wall_on_the_way_is_not_looked_at():
-    assert plan_of(WALL, START, GOAL)[-1].tolist() == [10.5, 1.5, 0.0]
-
-
 def test_a_goal_in_a_wall_is_drawn_back_a_hundredth_at_a_time():
     plan = plan_of(WALL, START, Pose2D(5.5, 1.5))
     # The front corners at x + 0.4 are clear of the wall at 5 m from x < 4.6 on: steps of 0.05 m.
     assert plan[-1].tolist() == pytest.approx([4.55, 1.5, 0.0])
-
-
-def test_unknown_space_is_no_place_for_the_robot():
-    assert plan_of(WALL.replace("#", "?"), START, Pose2D(5.5, 1.5))[-1, 0] < 4.6
-
-
-def test_a_goal_off_the_map_is_drawn_back_onto_it():
-    plan = plan_of(FIELD, START, Pose2D(20.5, 1.5))
-    assert plan[-1, 0] == pytest.approx(0.5 + 20 * 0.50)  # 10.5 m; 10.7 m would stick out
 
 
 def test_heading_is_drawn_back_with_the_position_the_short_way():
@@ -68,8 +55,3 @@ def test_heading_is_drawn_back_with_the_position_the_short_way():
 def test_nowhere_to_be():
     with pytest.raises(NoPath, match=r"\(5\.50, 1\.50\) to \(5\.50, 2\.50\)"):
         plan_of(WALL, Pose2D(5.5, 1.5), Pose2D(5.5, 2.5))
-
-
-def test_no_robot_no_plan():
-    with pytest.raises(NoPath):
-        plan_of(FIELD, START, GOAL, robot=ROBOT[:2])

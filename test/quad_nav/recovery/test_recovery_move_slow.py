@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from costmap_maps import drawn, picture
 
-from quad_nav.config import load, updated
+from quad_nav.config import load
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
@@ -23,7 +23,7 @@ from quad_nav.recovery import (
     ParameterLimit,
     RecoveryContext,
 )
-from quad_nav.scenario.assembly import apply_configuration, build_navigator
+from quad_nav.scenario.assembly import build_navigator
 
 HERE = Pose2D(2.5, 2.5)
 LIMIT = ParameterLimit(
@@ -86,65 +86,6 @@ def test_costmaps_that_cannot_be_cleared_are_reported():
         "limiting speed to 0.25 m/s and 0.45 rad/s for the next 0.3 m",
     ]
     assert (small.layers["laser"].grid.costs == 254).all()
-
-
-def test_at_an_unknown_pose_nothing_is_cleared_or_limited():
-    costmap = full(costmap_of())
-    step = MoveSlowAndClear(MoveSlowAndClearParams()).step(
-        RecoveryContext(0.0, costmap, costmap, None, None)
-    )
-    assert step.done and step.limit is None
-    assert step.message.count("robot pose unknown") == 2
-    assert (costmap.layers["laser"].grid.costs == 254).all()
-
-
-def test_a_planner_without_speeds_is_not_limited():
-    step = MoveSlowAndClear(MoveSlowAndClearParams()).step(
-        RecoveryContext(0.0, full(costmap_of()), full(costmap_of()), HERE, HERE)
-    )
-    assert (step.message, step.limit) == ("", None)
-
-
-def test_the_speeds_become_one_limit():
-    params = MoveSlowAndClearParams(translation_fields=("a", "b"), rotation_fields=("c",))
-    assert params.limit == ParameterLimit((("a", 0.25), ("b", 0.25), ("c", 0.45)), 0.3)
-
-
-def test_limits_are_lifted_when_the_robot_has_moved_far_enough():
-    usual = TrajectoryPlannerParams(max_vel_x_mps=1.0, min_vel_theta_radps=-2.0)
-    controller = Controller(usual)
-    speed = ParameterLimiter(controller)
-    speed.impose(LIMIT, HERE, 0.0)
-    limited = controller.params
-    assert limited == replace(
-        usual, max_vel_x_mps=0.25, max_vel_theta_radps=0.45, min_vel_theta_radps=-0.45
-    )
-    speed.track(Pose2D(2.5, 2.79))
-    assert controller.params == limited
-    speed.track(Pose2D(2.5, 2.81))
-    assert controller.params == usual
-
-
-def test_a_limit_never_raises_a_speed():
-    controller = Controller(TrajectoryPlannerParams(max_vel_x_mps=0.1))
-    ParameterLimiter(controller).impose(LIMIT, HERE, 0.0)
-    assert controller.params.max_vel_x_mps == 0.1
-
-
-def test_a_limit_of_the_same_parameters_replaces_the_first():
-    usual = TrajectoryPlannerParams()
-    controller = Controller(usual)
-    speed = ParameterLimiter(controller)
-    speed.impose(LIMIT, HERE, 0.0)
-    faster = tuple((field, 0.4) for field, _ in LIMIT.greatest)
-    speed.impose(ParameterLimit(faster, 1.0), Pose2D(2.5, 2.7), 0.0)
-    assert controller.params == replace(
-        usual, max_vel_x_mps=0.4, max_vel_theta_radps=0.4, min_vel_theta_radps=-0.4
-    )
-    speed.track(Pose2D(2.5, 3.0))
-    assert controller.params.max_vel_x_mps == 0.4
-    speed.track(Pose2D(2.5, 3.8))
-    assert controller.params == TrajectoryPlannerParams()
 
 
 def test_parameters_that_change_under_a_limit_take_effect_with_its_end():
@@ -210,13 +151,6 @@ def test_the_navigator_limits_its_controller_and_lifts_the_limit(stuck):
     assert stuck.max_vel_x_mps == 0.6
 
 
-def test_commands_stay_below_the_limit(stuck):
-    ticks = stuck.fly(Pose2D(2.6, 2.5), 2.0)
-    speeds = [tick.command.vx_mps for tick in ticks if tick.control]
-    assert speeds and max(speeds) <= 0.25
-    assert np.max(np.abs([tick.command.vyaw_radps for tick in ticks if tick.control])) <= 0.45
-
-
 def test_a_limit_outlives_a_cancelled_goal_and_ends_on_the_path_to_the_next(stuck):
     stuck.navigator.cancel()
     stuck.fly(HERE, 0.3)
@@ -226,19 +160,6 @@ def test_a_limit_outlives_a_cancelled_goal_and_ends_on_the_path_to_the_next(stuc
     assert stuck.max_vel_x_mps == 0.25
     stuck.fly(Pose2D(2.0, 2.5), 0.3)
     assert stuck.max_vel_x_mps == 0.6
-
-
-def test_a_clock_that_jumps_back_lifts_the_limit(stuck):
-    stuck.navigator.restart(0.0)
-    assert stuck.max_vel_x_mps == 0.6
-
-
-def test_reconfiguration_does_not_lift_the_limit(stuck):
-    changed = updated(stuck.configuration, "TrajectoryPlannerROS", {"max_vel_x": 0.8})
-    apply_configuration(stuck.navigator, changed)
-    assert stuck.max_vel_x_mps == 0.25
-    stuck.fly(Pose2D(2.9, 2.5), 0.5)
-    assert stuck.max_vel_x_mps == 0.8
 
 
 def test_dwa_is_limited_in_all_its_speeds_and_flies_below_them():

@@ -4,54 +4,8 @@ from __future__ import annotations
 
 import pytest
 from matplotlib.figure import Figure
-from optuna.distributions import CategoricalDistribution, FloatDistribution
-from optuna.trial import create_trial
 
-from quad_nav.report.style import label_log, png, styled
-from quad_tune.report.search_pictures import history_picture, slice_picture
-from quad_tune.space import Dimension, SearchSpace
-
-DISTRIBUTIONS = {
-    "a/weight": FloatDistribution(0.0003, 0.03, log=True),
-    "*_costmap/scale": FloatDistribution(1.0, 20.0, log=True),
-    "a/speed": FloatDistribution(0.2, 0.6),
-    "rate": CategoricalDistribution((5.0, 10.0)),
-}
-SPACE = SearchSpace(
-    "by hand",
-    (
-        *(
-            Dimension(name, one.low, one.high, log=one.log)
-            for name, one in DISTRIBUTIONS.items()
-            if name != "rate"
-        ),
-        Dimension("rate", choices=(5.0, 10.0)),
-    ),
-)
-
-
-def trial(number: int, cost: float, *values: float):
-    made = create_trial(
-        value=cost, params=dict(zip(DISTRIBUTIONS, values)), distributions=DISTRIBUTIONS
-    )
-    made.number = number
-    return made
-
-
-TRIALS = [
-    trial(0, 5.0, 0.001, 4.0, 0.3, 10.0),
-    trial(1, 9000.0, 0.0004, 18.0, 0.5, 5.0),
-    trial(2, 4.0, 0.02, 1.5, 0.4, 10.0),
-]
-
-
-def test_no_source_of_formulas_in_pictures_of_a_search(written):
-    base = {"a/weight": 0.001, "*_costmap/scale": 4.0, "a/speed": 0.3, "rate": 10.0}
-    with styled():
-        png(history_picture(TRIALS, 5.0))
-        png(slice_picture(TRIALS, SPACE, SPACE.paths, {"a/weight": 0.02}, base, 5.0))
-    assert {"0.001", "0.01", "10", "tuned", "10.0"} <= set(written)
-    assert [text for text in written if "$" in text] == []
+from quad_nav.report.style import label_log, styled
 
 
 @pytest.mark.parametrize(

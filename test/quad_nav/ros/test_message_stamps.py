@@ -65,16 +65,6 @@ def _observations(sink):
     return sink.layer.buffers[sink.source.name].observations
 
 
-@pytest.mark.parametrize("stamp_ns", STAMPS_NS[:4] + SINCE_1970)
-def test_a_scan_finds_the_only_transform_which_has_its_stamp(ros, stamp_ns):
-    transforms, sensor = Transforms(), sensor_with()
-    at(ros, stamp_ns)
-    deliver("/tf", TFMessage([transform(stamp_ns)]))
-    deliver("/scan0", scan(stamp_ns))
-    sensor.deliver(transforms)
-    assert received(sensor) == [time_of(stamp_ns).to_sec()] and not ros.log.lines
-
-
 def test_no_scan_is_dropped_whatever_its_stamp(ros):
     """Each has its transform and that of the scan before."""
     transforms, sensor = Transforms(), sensor_with()

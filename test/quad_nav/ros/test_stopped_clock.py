@@ -90,6 +90,7 @@ def test_a_clock_is_named_where_there_is_one(ros, wall, monkeypatch, has_clock, 
 
     robot = SimpleNamespace(
         name="quad0",
+        health=None,
         subscribers=[],
         stop=lambda: None,
         due_s=0.0,

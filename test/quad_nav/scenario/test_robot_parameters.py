@@ -1,10 +1,6 @@
 """The command with which roslaunch loads a robot's parameters."""
 
-import os
 import shutil
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 import yaml
@@ -64,17 +60,6 @@ def test_every_file_with_a_fault_is_named(folder, tmp_path, capsys, monkeypatch)
     assert errors[2] == f"  {folder}/move_base_params.yaml:1: unknown $(arg j); expected $(arg i)"
     monkeypatch.setenv(COLLECT, "1")
     assert [f"  {line}" for line in printed(capsys, *arguments)[FAULTS]] == errors[1:]
-
-
-def test_roslaunch_does_not_wait_for_the_engine():
-    code = (
-        "import sys; from quad_nav.scenario.robot_parameters import main;"
-        "main(['--config', 'default', '--robot', '0']);"
-        "sys.exit(bool({'numba', 'pybullet', 'scipy'} & set(sys.modules)))"
-    )
-    environment = {**os.environ, "PYTHONPATH": str(Path(config.__file__).parents[2])}
-    run = subprocess.run([sys.executable, "-c", code], env=environment, check=False)
-    assert run.returncode == 0
 
 
 def test_an_unknown_name_of_the_configuration_package_is_an_attribute_error():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from quad_nav.geometry import Pose2D
@@ -42,16 +43,8 @@ def test_walls_and_what_stands_at_the_flying_altitude_are_occupied():
 
 def test_a_configuration_with_a_static_map_flies():
     static = (("global_costmap/static_map", True),)
-    summary = fly(
-        read_setup(
-            FlightOptions(
-                ROOT / "scenes" / "arena.yaml",
-                ROOT / "goals",
-                "tutorial",
-                static,
-                robots=1,
-                time_limit_s=6.0,
-            )
-        )
+    options = FlightOptions(
+        ROOT / "scenes" / "arena.yaml", ROOT / "goals", "tutorial", static, robots=1
     )
+    summary = fly(read_setup(replace(options, time_limit_s=6.0)))
     assert summary.robots[0].path_length_m > 0.5

@@ -29,16 +29,11 @@ def test_defaults():
     assert setup.params.lidar_caster == "kernel"
 
 
-def test_the_physics_engine_casts_the_beams_if_asked_to():
-    assert (
-        read_setup({"scene": ARENA, "lidar": "bullet"}, "simulator").params.lidar_caster == "bullet"
-    )
-
-
 def test_the_tutorials_half_turn_is_one_argument_away():
-    lidar = read_setup({"scene": ARENA, "scan_range": math.pi}, "simulator").params.lidar
-    assert lidar.beam_count == 512
-    assert lidar.step_size_rad == pytest.approx(0.006135923, abs=1e-9)
+    setup = read_setup({"scene": ARENA, "scan_range": math.pi, "lidar": "bullet"}, "simulator")
+    assert setup.params.lidar_caster == "bullet"
+    assert setup.params.lidar.beam_count == 512
+    assert setup.params.lidar.step_size_rad == pytest.approx(0.006135923, abs=1e-9)
 
 
 def test_every_fault_is_listed():
@@ -71,9 +66,3 @@ def test_every_fault_is_listed():
 )
 def test_single_faults(parameters, problem):
     assert faults_of(**parameters) == [problem]
-
-
-def test_a_bad_scene_is_named(tmp_path):
-    assert faults_of(scene=str(tmp_path / "none.yaml"))[0].startswith(
-        f"{tmp_path / 'none.yaml'}: cannot be read"
-    )

@@ -23,8 +23,8 @@ from quad_nav.scenario.assembly import GLOBAL_PLANNERS, LOCAL_PLANNERS
 from quad_nav.sim import casters
 
 
-@pytest.fixture
-def missions(monkeypatch):
+@pytest.fixture(scope="module")
+def missions():
     """(navigator, its ticks) of each mission that ``fly_missions`` flies."""
     flown = []
     build = warm_up.NavigatorHost
@@ -36,8 +36,9 @@ def missions(monkeypatch):
         flown.append((host.navigator, ticks))
         return host
 
-    monkeypatch.setattr(warm_up, "NavigatorHost", recording)
-    warm_up.fly_missions()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(warm_up, "NavigatorHost", recording)
+        warm_up.fly_missions()
     return flown
 
 
@@ -50,8 +51,9 @@ def test_every_kernel_of_a_cycle_has_run(missions):
         assert not ticks[0].windows["local"].is_empty
 
 
-def test_a_peers_points_are_removed_from_the_last_scans(missions):
-    for navigator, _ in missions:
+def test_each_mission_makes_room_for_a_peer_and_removes_its_points(missions):
+    for navigator, ticks in missions:
+        assert ticks[-1].yielding is not None and ticks[-1].yielding.holding_point is not None
         layers = [
             layer
             for layer in navigator.local_costmap.layers.values()
@@ -60,38 +62,25 @@ def test_a_peers_points_are_removed_from_the_last_scans(missions):
         assert layers and all(len(layer.excluded_circles) == 1 for layer in layers)
 
 
-def test_each_mission_makes_room_for_a_peer(missions):
-    for _, ticks in missions:
-        assert ticks[-1].yielding is not None and ticks[-1].yielding.holding_point is not None
-
-
 def test_every_planner_and_obstacle_layer_flies(missions):
     navigators = [navigator for navigator, _ in missions]
     assert {type(navigator.planner.params) for navigator in navigators} == set(GLOBAL_PLANNERS)
     assert {type(navigator.controller.params) for navigator in navigators} == set(LOCAL_PLANNERS)
     layers = {type(navigator.local_costmap.layers["obstacle_layer"]) for navigator in navigators}
     assert layers == {ObstacleLayer, VoxelLayer}
-
-
-def test_both_searches_and_both_paths_of_the_global_planner(missions):
-    params = [
-        navigator.planner.params
-        for navigator, _ in missions
-        if isinstance(navigator.planner, SearchPlanner)
-    ]
-    assert {one.use_dijkstra for one in params} == {True, False}
-    assert {one.use_grid_path for one in params} == {True, False}
+    planners = [one.planner for one in navigators if isinstance(one.planner, SearchPlanner)]
+    assert {one.params.use_dijkstra for one in planners} == {True, False}
+    assert {one.params.use_grid_path for one in planners} == {True, False}
 
 
 def test_any_configuration_can_be_warmed_up():
     warm_up.warm_up(load({"global_costmap": {"static_map": True}}))
 
 
-def test_every_kernel_that_python_calls_is_compiled():
+def test_every_kernel_that_python_calls_is_compiled(missions):
     """A kernel that is compiled in flight stops the robot."""
     if numba.config.DISABLE_JIT or kernel_cache.FOLDER is None:
         pytest.skip("nothing is compiled, or nothing is kept")
-    warm_up.fly_missions()
     called = kernels_called_in_python()
     assert len(called) > 50
     assert sorted(name for name, kernel in called.items() if not is_compiled(kernel)) == []

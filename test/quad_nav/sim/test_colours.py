@@ -8,10 +8,6 @@ import math
 from quad_nav.sim.colours import ROBOT_COLOURS, robot_rgba
 
 
-def test_the_first_colours_are_the_listed_ones():
-    assert robot_rgba(1, 0.5) == (230 / 255, 110 / 255, 20 / 255, 0.5)
-
-
 def test_sixteen_colours_are_distinct():
     assert len(ROBOT_COLOURS) == 16
     for a, b in itertools.combinations(ROBOT_COLOURS, 2):

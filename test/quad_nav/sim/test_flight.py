@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from quad_nav.geometry import Twist2D, quaternion_from_euler, rotation_from_quaternion
+from quad_nav.geometry import Twist2D, quaternion_from_euler
 from quad_nav.sim.flight import (
     GRAVITY_MPS2,
     Airframe,
@@ -88,52 +88,14 @@ def test_acceleration_is_limited_by_the_tilt():
 
 
 def test_rows_are_independent():
-    states = BodyState(
-        np.array(
-            [
-                [
-                    0.0,
-                    0.0,
-                    1.0,
-                    *quaternion_from_euler(0.0, 0.0, 0.3),
-                    0.1,
-                    0.0,
-                    0.0,
-                    0.0,
-                    0.0,
-                    0.2,
-                ],
-                [
-                    5.0,
-                    5.0,
-                    0.8,
-                    *quaternion_from_euler(0.1, -0.1, 2.0),
-                    0.0,
-                    0.4,
-                    -0.1,
-                    0.3,
-                    0.0,
-                    -0.5,
-                ],
-            ]
-        )
-    )
-    commands = np.array([[0.3, 0.0, 0.5], [-0.2, 0.1, 0.0]])
-    both = FlightLaw(AIRFRAME, PARAMS).thrust_and_torque(states, commands, 1.0)
-    for k in range(2):
-        one = BodyState(states.rows[k : k + 1])
-        alone = FlightLaw(AIRFRAME, PARAMS).thrust_and_torque(one, commands[k : k + 1], 1.0)
-        assert both[0][k] == pytest.approx(alone[0][0])
-        assert both[1][k] == pytest.approx(alone[1][0])
-
-
-def test_rotations_of_many_bodies_equal_those_of_each():
-    quaternions = [quaternion_from_euler(0.1, -0.2, 0.3), quaternion_from_euler(0.0, 0.5, -2.0)]
-    rows = np.zeros((2, 13))
-    rows[:, 3:7] = quaternions
-    rotations = BodyState(rows).rotations
-    for k, quaternion in enumerate(quaternions):
-        assert rotations[k] == pytest.approx(rotation_from_quaternion(quaternion))
+    turning = body(yaw=0.3, velocity=(0.1, 0.0, 0.0), angular=(0.0, 0.0, 0.2))
+    tilted = body(0.1, -0.1, 2.0, 0.8, velocity=(0.0, 0.4, -0.1), angular=(0.3, 0.0, -0.5))
+    commands = [(0.3, 0.0, 0.5), (-0.2, 0.1, 0.0)]
+    both = BodyState(np.concatenate([turning.rows, tilted.rows]))
+    forces, torques = FlightLaw(AIRFRAME, PARAMS).thrust_and_torque(both, np.array(commands), 1.0)
+    for k, state in enumerate((turning, tilted)):
+        force, torque = forces_on(state, *commands[k])
+        assert forces[k] == pytest.approx(force) and torques[k] == pytest.approx(torque)
 
 
 @pytest.mark.parametrize(

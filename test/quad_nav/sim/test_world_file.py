@@ -142,18 +142,6 @@ def test_faults_of_actors(tmp_path, script, problem):
     assert faults(written(tmp_path, actor(script))) == [f"a.world: line 3: {problem}"]
 
 
-def test_primitives_have_the_poses_that_they_have_in_gazebo(tmp_path):
-    same(
-        only(tmp_path, model(BOX, "4 5 1.5 0 0 0.3")),
-        Box("m/l/c", 4.0, 5.0, 1.0, 2.0, 3.0, 0.3, 0.0),
-    )
-    same(
-        only(tmp_path, model(CYLINDER, "4 5 1.5 0 0 0.3")),
-        Cylinder("m/l/c", 4.0, 5.0, 0.5, 2.0, 0.5),
-    )
-    same(only(tmp_path, model(SPHERE, "4 5 1.5 1 2 3")), Sphere("m/l/c", 4.0, 5.0, 1.5, 0.5))
-
-
 def test_parts_below_the_floor_are_cut_off(tmp_path):
     same(only(tmp_path, model(BOX, "0 0 0.5 0 0 0")), Box("m/l/c", 0.0, 0.0, 1.0, 2.0, 2.0))
     same(only(tmp_path, model(CYLINDER, "0 0 0 0 0 0")), Cylinder("m/l/c", 0.0, 0.0, 0.5, 1.0))
@@ -193,13 +181,12 @@ def test_boxes_may_lie_on_any_side(tmp_path, angles, size_x, size_y, height, yaw
     assert box.bottom_m == pytest.approx(5.0 - height / 2)
 
 
-def test_degrees_and_quaternions(tmp_path):
-    by_degrees = model(BOX).replace("<pose>0 0 0 0 0 0", '<pose degrees="true">0 0 2 0 0 90')
-    assert only(tmp_path, by_degrees).yaw_rad == pytest.approx(QUARTER)
-    by_quaternion = model(BOX).replace(
-        "<pose>0 0 0 0 0 0", '<pose rotation_format="quat_xyzw">0 0 2 0 0 1 1'
-    )
-    assert only(tmp_path, by_quaternion).yaw_rad == pytest.approx(QUARTER)
+@pytest.mark.parametrize(
+    "pose", ['degrees="true">0 0 2 0 0 90', 'rotation_format="quat_xyzw">0 0 2 0 0 1 1']
+)
+def test_degrees_and_quaternions(tmp_path, pose):
+    box = only(tmp_path, model(BOX).replace("<pose>0 0 0 0 0 0", f"<pose {pose}"))
+    assert box.yaw_rad == pytest.approx(QUARTER)
 
 
 def test_ground_plane_and_sun_are_floor_and_light(tmp_path):
@@ -216,14 +203,7 @@ def test_ground_plane_and_sun_are_floor_and_light(tmp_path):
         (model(BOX, "0 0 2 0.1 0 0"), "left out, tilted box: m/l/c"),
         (model(CYLINDER, "0 0 2 0 1.5 0"), "left out, tilted cylinder: m/l/c"),
         (model("<mesh><uri>a.dae</uri></mesh>"), "left out, mesh: m/l/c"),
-        (
-            model("<heightmap/>") + model("<heightmap/>", name="n"),
-            "left out, heightmap: m/l/c, n/l/c",
-        ),
-        (
-            model("<plane><normal>1 0 0</normal></plane>"),
-            "left out, plane that is not the floor: m/l/c",
-        ),
+        (model("<a/>") + model("<a/>", name="n"), "left out, a: m/l/c, n/l/c"),
         (model("<plane/>", "0 0 1 0 0 0"), "left out, plane that is not the floor: m/l/c"),
         (model(BOX, "0 0 -1.5 0 0 0"), "left out, nothing above the floor: m/l/c"),
         (
@@ -305,14 +285,9 @@ def test_a_model_that_includes_itself_is_refused(tmp_path):
             model("<sphere><radius>-1</radius></sphere>"),
             "line 3: <radius>: '-1', expected a number of metres, above 0",
         ),
-        (
-            model("<sphere><radius>nan</radius></sphere>"),
-            "line 3: <radius>: 'nan', expected a number of metres",
-        ),
         (model("<sphere/>"), "line 3: <sphere>: <radius> is missing, expected a number of metres"),
         (model(SPHERE, "0 0 0 0 0"), "line 3: <pose>: '0 0 0 0 0', expected x y z roll pitch yaw"),
         ("</world><world name='v'>", "line 3: a second <world>, expected one"),
-        ("<a>" * 99 + "</a>" * 99, "line 3: more than 100 elements inside each other"),
     ],
 )
 def test_faults_have_a_line(tmp_path, content, problem):
@@ -329,14 +304,6 @@ def test_xml_bombs_are_refused(tmp_path):
     path.write_text('<?xml version="1.0"?>\n<!DOCTYPE a [<!ENTITY b "bbbb">]>\n<sdf>&b;</sdf>')
     (problem,) = faults(path)
     assert problem.startswith("bomb.world: line 2: DOCTYPE and entities are refused")
-
-
-def test_other_xml_and_missing_files(tmp_path):
-    path = tmp_path / "a.sdf"
-    path.write_text("<robot/>")
-    assert faults(path) == ["a.sdf: line 1: <robot>, expected <sdf>"]
-    with pytest.raises(InputError, match="none.world: cannot be read: .*No such file"):
-        load_world(tmp_path / "none.world")
 
 
 def test_a_world_by_itself_is_a_scene(tmp_path):

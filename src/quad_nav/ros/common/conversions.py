@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import List, Mapping, Sequence, Tuple
+from typing import List, Mapping, Tuple
 
 import numpy as np
 import rospy
@@ -22,11 +22,9 @@ from geometry_msgs.msg import (
 from nav_msgs.msg import Odometry
 from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan
-from std_msgs.msg import ColorRGBA, Header
-from visualization_msgs.msg import Marker, MarkerArray
+from std_msgs.msg import Header
 
-from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, quaternion_from_yaw
-from quad_nav.topics import markers
+from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 
 _NO_COVARIANCE = [0.0] * 36
 _NO_INTENSITIES = np.empty(0, dtype=np.float32)
@@ -159,32 +157,3 @@ def scan_from_message(message: LaserScan) -> Scan:
         message.range_max,
         np.array(message.ranges, dtype=np.float32),
     )
-
-
-def marker_array(shown: Sequence[markers.Marker], stamp_s: float = 0.0) -> MarkerArray:
-    """Convert markers; with a stamp of 0 they hold at any time."""
-    return MarkerArray([_marker_message(marker, stamp_s) for marker in shown])
-
-
-def replacing_markers(shown: Sequence[markers.Marker]) -> MarkerArray:
-    """Convert markers, preceded by an order to delete all markers that were shown before."""
-    clear = Marker(action=Marker.DELETEALL)
-    clear.header.frame_id = "map"
-    return MarkerArray([clear, *marker_array(shown).markers])
-
-
-def _marker_message(marker: markers.Marker, stamp_s: float) -> Marker:
-    message = Marker(
-        ns=marker.namespace,
-        id=marker.number,
-        type=marker.kind,
-        action=Marker.ADD,
-        pose=Pose(Point(*marker.place_m), Quaternion(*quaternion_from_yaw(marker.yaw_rad))),
-        scale=Vector3(*marker.size_m),
-        color=ColorRGBA(*marker.rgba),
-        text=marker.text,
-        frame_locked=marker.frame_locked,
-        points=[Point(*point) for point in marker.points_m],
-    )
-    message.header.frame_id, message.header.stamp = marker.frame, time_message(stamp_s)
-    return message

@@ -25,8 +25,8 @@ from visualization_msgs.msg import MarkerArray
 from quad_nav.errors import InputError, printable
 from quad_nav.files.output import reason, write_text
 from quad_nav.files.values import is_whole
-from quad_nav.ros.common.conversions import replacing_markers
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
+from quad_nav.ros.common.marker_messages import replacing_markers
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.scenario.scenario import scene_of

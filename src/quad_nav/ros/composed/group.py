@@ -27,7 +27,6 @@ from quad_nav.ros.navigator.costmap_publisher import NewSubscriber, Publish
 from quad_nav.ros.navigator.health_meters import LoopHealth
 from quad_nav.sim.casters import Lidars
 from quad_nav.sim.robot_state import RobotStates
-from quad_nav.topics.health import Health
 
 
 class ScanTopic:
@@ -69,12 +68,13 @@ class ComposedGroup(NavigatorGroup):
         self._states: Optional[RobotStates] = None
         super().__init__(setup, robots, lidars)
         self._scans = {number: ScanTopic(number) for number in robots}
-        self._loop_health = LoopHealth([robot.interface.name for robot in self.robots.values()])
+        interfaces = [robot.interface for robot in self.robots.values()]
+        self._loop_health = LoopHealth({one.name: one.health for one in interfaces})
         self._topic_watch = TopicWatch(
             [subscriber for robot in self.robots.values() for subscriber in robot.subscribers]
         )
         self._needs_transforms = any(robot.needs_transforms for robot in self.robots.values())
-        publish_health(self._read_health)
+        publish_health(self._loop_health.read)
 
     def new_robot(self, number: int) -> ComposedRobot:
         """Build a robot's navigator and its interface."""
@@ -122,13 +122,6 @@ class ComposedGroup(NavigatorGroup):
         if not rospy.is_shutdown():
             for robot in self.robots.values():
                 robot.interface.stop()
-
-    def _read_health(self) -> List[Health]:
-        now_s = rospy.get_time()
-        return [
-            self._loop_health.read(now_s),
-            *(one for robot in self.robots.values() for one in robot.interface.health.read(now_s)),
-        ]
 
 
 @dataclass(frozen=True)

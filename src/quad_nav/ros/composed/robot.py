@@ -60,7 +60,6 @@ class ComposedRobot(LoopRobot):
             names,
             [*own_meters, *(sensor.meter for sensor in self._sensors)],
         )
-        self._maps = static_maps.connect(self.costmaps, self.interface.lock, names)
         global_frame = self.costmaps[0].params.global_frame
         self._intention = robot_publisher(names, global_frame)
 

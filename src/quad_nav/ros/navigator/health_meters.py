@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from typing import List, Sequence
+from typing import List, Mapping, Sequence
 
 import rospy
 
@@ -108,12 +108,12 @@ class NavigatorHealth:
 
 
 class LoopHealth:
-    """Measure the control loop of a process.
+    """Measure the control loop of a process and its robots, given by name.
 
     The loop calls `update`, another thread calls `read`.
     """
 
-    def __init__(self, robots: Sequence[str]) -> None:
+    def __init__(self, robots: Mapping[str, NavigatorHealth]) -> None:
         self._robots = robots
         self._late_s, self._round_s, self._round_now_s = 0.0, time.monotonic(), 0.0
         self._read_wall_s, self._read_cpu_s = time.monotonic(), time.process_time()
@@ -123,21 +123,24 @@ class LoopHealth:
         self._late_s = max(self._late_s, late_s)
         self._round_s, self._round_now_s = time.monotonic(), now_s
 
-    def read(self, now_s: float) -> Health:
-        """Return the status since the last call.
+    def read(self) -> List[Health]:
+        """Return the statuses of loop and robots since the last call.
 
         A loop that waits for a stopped clock does not count as blocked.
         """
+        now_s = rospy.get_time()
         wall_s, cpu_s = time.monotonic(), time.process_time()
         cpu = (cpu_s - self._read_cpu_s) / max(wall_s - self._read_wall_s, 1e-3)
         self._read_wall_s, self._read_cpu_s = wall_s, cpu_s
         late_s, self._late_s = self._late_s, 0.0
         blocked_s = wall_s - self._round_s if now_s > self._round_now_s + health.LATE_S else 0.0
-        return health.loop_health(
+        robots = list(self._robots)
+        loop = health.loop_health(
             rospy.get_name().lstrip("/"),
-            health.Loop(len(self._robots), late_s, blocked_s, cpu, _memory_mb()),
-            self._robots[0] if len(self._robots) == 1 else "",
+            health.Loop(len(robots), late_s, blocked_s, cpu, _memory_mb()),
+            robots[0] if len(robots) == 1 else "",
         )
+        return [loop, *(one for meters in self._robots.values() for one in meters.read(now_s))]
 
 
 def _memory_mb() -> float:

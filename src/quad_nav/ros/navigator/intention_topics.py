@@ -43,11 +43,15 @@ INTENTIONS_TOPIC = "/quad/intentions"
 _INTENTION_TOPIC = "/move_base{}/intention"
 REPEAT_S = 0.25
 INTENTION_VALID_S = 2.0  # the navigator that published an older intention has died
-_POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("robot", "<u4"), ("priority", "<f8")])
-_KINDS = {"<f4": PointField.FLOAT32, "<u4": PointField.UINT32, "<f8": PointField.FLOAT64}
-_FIELDS = [
-    PointField(name, place, _KINDS[kind.str], 1) for name, (kind, place) in _POINT.fields.items()
-]
+_COLUMNS = (
+    ("x", "<f4", PointField.FLOAT32),
+    ("y", "<f4", PointField.FLOAT32),
+    ("z", "<f4", PointField.FLOAT32),
+    ("robot", "<u4", PointField.UINT32),
+    ("priority", "<f8", PointField.FLOAT64),
+)
+_POINT = np.dtype([(name, kind) for name, kind, _ in _COLUMNS])
+_FIELDS = [PointField(name, 4 * k, kind, 1) for k, (name, _, kind) in enumerate(_COLUMNS)]
 
 
 class IntentionPublisher:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import List, Optional, Sequence
+from typing import Optional, Sequence
 
 import rospy
 from rospy.rostime import is_wallclock
@@ -14,7 +14,6 @@ from quad_nav.ros.navigator.health_meters import LoopHealth
 from quad_nav.ros.navigator.peer_topics import PeerTopics
 from quad_nav.ros.navigator.robot_navigator import POLL_S, RobotNavigator
 from quad_nav.timing import is_due
-from quad_nav.topics.health import Health
 
 STALL_S = 0.5  # wall time, as the next
 DRAIN_S = 0.25
@@ -38,13 +37,13 @@ class NavigatorLoop:
         self._topic_watch = TopicWatch(
             [subscriber for one in robots for subscriber in one.subscribers]
         )
-        self._health = LoopHealth([robot.name for robot in robots])
+        self._health = LoopHealth({robot.name: robot.health for robot in robots})
         self._start_s = self._now_s = 0.0
         self._wall_s: Optional[float] = None  # of the clock's last step
 
     def run(self) -> None:
         """Wait for the clock, then serve the robots until ROS shuts down."""
-        publish_health(self._read_health)
+        publish_health(self._health.read)
         for robot in self._robots:
             rospy.on_shutdown(robot.stop)
         while rospy.get_time() == 0.0 and not rospy.is_shutdown():
@@ -111,10 +110,3 @@ class NavigatorLoop:
             if is_due(robot.due_s, now_s):
                 robot.step(now_s)
         self._topic_watch.check()
-
-    def _read_health(self) -> List[Health]:
-        now_s = rospy.get_time()
-        return [
-            self._health.read(now_s),
-            *(one for robot in self._robots for one in robot.health.read(now_s)),
-        ]

@@ -7,7 +7,7 @@ from quad.msg import MovingObstacle, MovingObstacles
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.costmap.scan_filter import ScanFilters
-from quad_nav.ros.common.conversions import replacing_markers
+from quad_nav.ros.common.marker_messages import replacing_markers
 from quad_nav.ros.common.own_messages import stamped
 from quad_nav.topics.publishing import Names
 from quad_nav.topics.tracked_obstacles import (

@@ -1,7 +1,7 @@
 """The ROS interface of one robot's navigator: what it publishes, and what people ask of it.
 
-Topics, services, action, parameters and health are the same wherever the inputs come from: from
-topics, see `robot_navigator`, or from the simulation in the same process, see `ros/composed`.
+Topics, services, action, parameters, maps and health are the same wherever the other inputs come
+from: topics, see `robot_navigator`, or the simulation in the same process, see `ros/composed`.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from quad_nav.navigator.tick import Outcome, RobotPoses, Tick
 from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms
+from quad_nav.ros.navigator import static_maps
 from quad_nav.ros.navigator.costmap_publisher import CostmapPublisher
 from quad_nav.ros.navigator.goal_server import GoalServer
 from quad_nav.ros.navigator.health_meters import InputMeter, NavigatorHealth
@@ -66,6 +67,7 @@ class RobotInterface:
         )
         self._services = PlanServices(host, self._topics, self.lock, locate, names)
         self._goals = GoalServer(number, transforms, global_frame, names)
+        self._maps = static_maps.connect(host.costmaps, self.lock, names)
         node = rospy.get_name() if names is own_node else names("~")
         self.health = NavigatorHealth(node.strip("/"), self.name, inputs)
 

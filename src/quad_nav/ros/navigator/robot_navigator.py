@@ -68,7 +68,6 @@ class RobotNavigator(NavigatorHost):
             [self._odometry_meter, *(sensor.meter for sensor in self._sensors)],
         )
         self._warnings, self.health = self._interface.warnings, self._interface.health
-        self._maps = static_maps.connect(self.costmaps, self._interface.lock, names)
 
     @property
     def subscribers(self) -> List[rospy.Subscriber]:

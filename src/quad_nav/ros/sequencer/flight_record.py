@@ -16,7 +16,6 @@ from quad_nav.mission.checkpoint import (
     MissionCheckpoint,
     RobotCheckpoint,
     robot_record,
-    shift_to_clock,
 )
 from quad_nav.mission.flight_log import FlightLog, Leg
 from quad_nav.mission.progress import SequenceProgress
@@ -117,7 +116,7 @@ class FlightRecord:
         with self.lock:
             robots = {
                 name: RobotCheckpoint(
-                    shift_to_clock(one, -start_s),
+                    one.shifted(-start_s),
                     self.log.robots[name].state,
                     self.log.distances.min_clearance_m(name),
                     self.log.distances.min_separation_m(name),

@@ -19,12 +19,12 @@ from std_msgs.msg import Time
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
-from quad_nav.mission.checkpoint import MissionCheckpoint, shift_to_clock
+from quad_nav.mission.checkpoint import MissionCheckpoint
 from quad_nav.mission.flight_log import FlightLog
 from quad_nav.mission.summary import MissionSummary, summarize
 from quad_nav.ros.common import readiness
-from quad_nav.ros.common.conversions import replacing_markers
 from quad_nav.ros.common.diagnostics import DiagnosticsTopic, ThrottledWarnings
+from quad_nav.ros.common.marker_messages import replacing_markers
 from quad_nav.ros.common.own_messages import flight_info_message
 from quad_nav.ros.common.readiness import Need
 from quad_nav.ros.common.transforms import TransformUnavailable
@@ -295,7 +295,7 @@ class MissionRunner:
         self._record.resume(before, now_s, same_clock)
         for robot in self.robots:
             progress = before.robots[robot.name].progress
-            robot.begin(now_s, shift_to_clock(progress, self._record.journal.start_s))
+            robot.begin(now_s, progress.shifted(self._record.journal.start_s))
             rospy.loginfo(
                 "%s: resuming goal %d of %d, lap %d",
                 robot.name,

@@ -186,11 +186,8 @@ class MissionRobot:
     def _serve_subscribers(self, inbox: Inbox) -> None:
         for subscriber in inbox.subscribers:
             if self.link.send_to(subscriber):
-                rospy.loginfo(
-                    "%s: %s sent to a new subscriber",
-                    self.name,
-                    self._goal(self.sequencer.index, self.sequencer.lap),
-                )
+                goal = self._goal(self.sequencer.index, self.sequencer.lap)
+                rospy.loginfo(f"{goal} sent to a new subscriber")
 
     def poll_file(self) -> bool:
         """Follow the goal file if it has been edited; return whether it has.
@@ -204,9 +201,9 @@ class MissionRobot:
             sequence = self._file.poll()
         except InputError as error:
             rospy.logerr(
-                "%s: edited goal file is not valid, keeping the previous goals:\n  %s",
+                "%s: edited goal file is not valid, keeping the previous goals:\n%s",
                 self.name,
-                "\n  ".join(error.problems),
+                error,
             )
             return False
         if sequence is None:
@@ -214,12 +211,9 @@ class MissionRobot:
         with self.lock:
             self.sequencer.replace_sequence(sequence)
             self.is_done = False
-        rospy.loginfo(
-            "%s: goal file reloaded: %d goals, %d of them flown",
-            self.name,
-            len(sequence.goals),
-            min(self.sequencer.index, len(sequence.goals)),
-        )
+        count = len(sequence.goals)
+        flown = min(self.sequencer.index, count)
+        rospy.loginfo(f"{self.name}: goal file reloaded: {count} goals, {flown} of them flown")
         return True
 
     def _do(self, action: Action, leg: Optional[Leg], now_s: float) -> None:
@@ -243,45 +237,28 @@ class MissionRobot:
         goal = self._goal(action.index, action.lap)
         if not action.resend_reason:
             away_m = self.pose.to_2d().distance_to(action.pose) if self.pose else 0.0
-            rospy.loginfo(
-                "%s: %s sent: (%.2f, %.2f) m, %.2f m away",
-                self.name,
-                goal,
-                action.pose.x_m,
-                action.pose.y_m,
-                away_m,
-            )
+            place = f"({action.pose.x_m:.2f}, {action.pose.y_m:.2f}) m, {away_m:.2f} m away"
+            rospy.loginfo(f"{goal} sent: {place}")
             return
-        rospy.logwarn(
-            "%s: %s sent again (attempt %d of %d): %s",
-            self.name,
-            goal,
-            action.attempt,
-            self.sequencer.sequence.settings.retries + 1,
-            action.resend_reason,
-        )
+        attempts = self.sequencer.sequence.settings.retries + 1
+        again = f"{goal} sent again (attempt {action.attempt} of {attempts})"
+        rospy.logwarn("%s: %s", again, action.resend_reason)
 
     def _log_ended(self, leg: Leg) -> None:
         goal = self._goal(leg.index, leg.lap)
         if leg.reached:
             rospy.loginfo(
-                "%s: %s reached in %.1f s, path %.2f m (straight %.2f m)",
-                self.name,
-                goal,
-                leg.time_s,
-                leg.path_length_m,
-                leg.straight_length_m,
+                f"{goal} reached in {leg.time_s:.1f} s, path {leg.path_length_m:.2f} m"
+                f" (straight {leg.straight_length_m:.2f} m)"
             )
             if leg.yaw_error_rad is not None:
-                rospy.loginfo("%s: %s yaw error %.2f rad", self.name, goal, leg.yaw_error_rad)
+                rospy.loginfo(f"{goal} yaw error {leg.yaw_error_rad:.2f} rad")
             if leg.goal.wait_s > 0.0:
-                rospy.loginfo("%s: %s staying for %g s", self.name, goal, leg.goal.wait_s)
+                rospy.loginfo(f"{goal} staying for {leg.goal.wait_s:g} s")
         else:
-            rospy.logwarn(
-                "%s: %s SKIPPED after %.1f s: %s", self.name, goal, leg.time_s, leg.reason
-            )
+            rospy.logwarn("%s SKIPPED after %.1f s: %s", goal, leg.time_s, leg.reason)
 
     def _goal(self, index: int, lap: int) -> str:
         sequence = self.sequencer.sequence
         round_ = f"lap {lap}, " if sequence.settings.loop else ""
-        return f"{round_}goal {index + 1} of {len(sequence.goals)}"
+        return f"{self.name}: {round_}goal {index + 1} of {len(sequence.goals)}"

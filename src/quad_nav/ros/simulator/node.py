@@ -8,7 +8,6 @@ at a reset.
 from __future__ import annotations
 
 import collections
-import functools
 import os
 import signal
 import sys
@@ -16,7 +15,8 @@ import time
 import traceback
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-from typing import Any, Callable, Deque, List, Tuple
+from functools import partial
+from typing import Any, Callable, Deque, List, Optional, Tuple
 
 import rospy
 from std_srvs.srv import (
@@ -122,45 +122,39 @@ class SimulatorNode:
         type_ = config_type("Simulator", [_rate_parameter(self._rate)])
         self._parameters = ParameterServer(type_, self._reconfigure, "~", {"rate": self._rate})
         for i in range(self._setup.robots):
-            rospy.Service(
-                f"/simulation/lidar{i}/enable", SetBool, functools.partial(self._enable_lidar, i)
-            )
+            rospy.Service(f"/simulation/lidar{i}/enable", SetBool, partial(self._enable_lidar, i))
         for name, action in (
             ("reset", self._reset),
             ("pause", self._pause),
             ("start", self._start),
         ):
-            rospy.Service(f"/simulation/{name}", Trigger, self._trigger_handler(action))
+            rospy.Service(f"/simulation/{name}", Trigger, partial(self._trigger, action))
 
     # Callbacks, in threads of their own.
 
     def _store_goals(self, message: MarkerArray) -> None:
         self._goals, self._goals_are_shown = message, False
 
-    def _trigger_handler(self, action: Callable[[], str]) -> Callable:
-        """Return a service handler that responds after the loop has carried out the action."""
+    def _in_loop(self, action: Callable[[], str]) -> Optional[str]:
+        """Let the loop carry out an action; return its text, None if it does not respond."""
+        done: Future = Future()
+        self._requests.append((action, done))
+        try:
+            text: str = done.result(_RESPONSE_TIMEOUT_S)
+        except FutureTimeoutError:
+            return None
+        return text
 
-        def handle(_: TriggerRequest) -> TriggerResponse:
-            done: Future = Future()
-            self._requests.append((action, done))
-            try:
-                return TriggerResponse(True, done.result(_RESPONSE_TIMEOUT_S))
-            except FutureTimeoutError:
-                return TriggerResponse(
-                    False, f"the simulator did not respond within {_RESPONSE_TIMEOUT_S:g} s"
-                )
-
-        return handle
+    def _trigger(self, action: Callable[[], str], _: TriggerRequest) -> TriggerResponse:
+        text = self._in_loop(action)
+        late = f"the simulator did not respond within {_RESPONSE_TIMEOUT_S:g} s"
+        return TriggerResponse(text is not None, late if text is None else text)
 
     def _reconfigure(self, requested: Any, _level: int) -> Any:
         """Let the loop take another rate, and return the values in force."""
         rate = requested["rate"]
         if rate != self._rate and is_number(rate) and rate > 0.0:
-            done: Future = Future()
-            self._requests.append((functools.partial(self._set_rate, rate), done))
-            try:
-                done.result(_RESPONSE_TIMEOUT_S)
-            except FutureTimeoutError:
+            if self._in_loop(partial(self._set_rate, rate)) is None:
                 rospy.logerr("simulator: rate not changed: the loop did not respond")
         requested["rate"] = self._rate
         return requested

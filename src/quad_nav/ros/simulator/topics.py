@@ -18,12 +18,12 @@ from visualization_msgs.msg import MarkerArray
 from quad_nav.ros.common.conversions import (
     ScanMessage,
     key_values,
-    marker_array,
     pose_array_message,
     scan_message,
     time_message,
 )
 from quad_nav.ros.common.diagnostics import DiagnosticsTopic
+from quad_nav.ros.common.marker_messages import marker_array
 from quad_nav.ros.common.nav_messages import map_message
 from quad_nav.ros.common.own_messages import contact_message, flight_info_message
 from quad_nav.ros.simulator.pose_topics import PoseTopics
