@@ -11,6 +11,9 @@ import numpy as np
 import plotly.graph_objects
 import pytest
 from hand_made_traces import TIMES_S, fleet, flight, goal, robot
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from PIL import Image
 from report_pages import Parsed, assert_loads_nothing, figures_of
 
@@ -99,6 +102,24 @@ def test_flights_that_hold_little(trace):
     page = flight_page(trace)
     assert Parsed(page.html).sections == SECTIONS
     assert "Mission failed" in page.html
+
+
+@pytest.fixture
+def written(monkeypatch):
+    """All that is written in the figures that are saved, and the texts that are markers."""
+    found = []
+    draw = Figure.savefig
+
+    def savefig(figure, *arguments, **options):
+        draw(figure, *arguments, **options)
+        found.extend(text.get_text() for text in figure.findobj(Text) if text.get_visible())
+        markers = [
+            line.get_marker() for legend in figure.legends for line in legend.findobj(Line2D)
+        ]
+        found.extend(marker for marker in markers if isinstance(marker, str))
+
+    monkeypatch.setattr(Figure, "savefig", savefig)
+    return found
 
 
 def test_pictures_of_a_report(tmp_path, written):
