@@ -168,27 +168,28 @@ class Parameter:
         return value
 
 
-def _numbers(kind: str, domain: Domain, doc: str) -> Callable[..., Any]:
-    """Return a function that declares numbers; None stands for a range without that end."""
+def number(
+    name: str,
+    default: float,
+    unit: str,
+    low: Any,
+    high: Any,
+    sentence: str,
+    domain: Domain = NOT_NEGATIVE,
+    kind: str = "double",
+    **more: Any,
+) -> Any:
+    """Declare a number, 0 or more; None for a range without that end.
 
-    def declare(
-        name: str, default: float, unit: str, low: Any, high: Any, sentence: str, **more: Any
-    ) -> Any:
-        accepted = more.pop("domain", domain)
-        return _declared(
-            Parameter(name, kind, default, sentence, unit, accepted, low, high), **more
-        )
-
-    declare.__doc__ = doc
-    return declare
+    ``positive`` declares one above 0, and ``signed`` one that may be negative. ``whole`` declares a
+    whole number. Below its range, a number of the last two is clamped.
+    """
+    return _declared(Parameter(name, kind, default, sentence, unit, domain, low, high), **more)
 
 
-number = _numbers("double", NOT_NEGATIVE, "Declare a number, 0 or more.")
-positive = _numbers("double", POSITIVE, "Declare a number above 0.")
-signed = _numbers(
-    "double", ANY, "Declare a number that may be negative; below its range it is clamped."
-)
-whole = _numbers("int", ANY, "Declare a whole number; outside of its range it is clamped.")
+positive = functools.partial(number, domain=POSITIVE)
+signed = functools.partial(number, domain=ANY)
+whole = functools.partial(number, domain=ANY, kind="int")
 
 
 def choice(name: str, default: int, choices: Tuple[Choice, ...], sentence: str, **more: Any) -> Any:
@@ -197,7 +198,7 @@ def choice(name: str, default: int, choices: Tuple[Choice, ...], sentence: str, 
     return _declared(Parameter(name, "int", default, sentence, choices=choices), **more)
 
 
-def flag(name: str, default: bool, sentence: str, **more: Any) -> Any:
+def flag(name: str, default: Optional[bool], sentence: str, **more: Any) -> Any:
     """Declare what is true or false."""
     return _declared(Parameter(name, "bool", default, sentence), **more)
 
@@ -225,14 +226,10 @@ def fixed_whole(name: str, default: int, sentence: str, **more: Any) -> Any:
     return _declared(Parameter(name, "int", default, sentence), is_fixed=True, **more)
 
 
-def fixed_flag(name: str, default: Optional[bool], sentence: str, **more: Any) -> Any:
-    """Declare what is true or false and read once; None for the value of another parameter."""
-    return flag(name, cast(bool, default), sentence, is_fixed=True, **more)
-
-
-def fixed_text(name: str, default: str, expected: str, sentence: str) -> Any:
-    """Declare a string that is read once."""
-    return text(name, default, expected, sentence, is_fixed=True)
+fixed_flag = functools.partial(flag, is_fixed=True)
+"""Declare what is true or false and read once; None for the value of another parameter."""
+fixed_text = functools.partial(text, is_fixed=True)
+"""Declare a string that is read once."""
 
 
 def deviation() -> Any:
