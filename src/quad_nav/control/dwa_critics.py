@@ -85,7 +85,6 @@ class Critics:
         grids: Optional[DwaGrids] = None,
     ) -> None:
         self.params = params
-        self.spec = spec
         # Upstream keeps the robot's state in single precision.
         self.pose = Pose2D(*single(pose.x_m, pose.y_m, pose.yaw_rad))
         self.velocity = single(velocity.vx_mps, velocity.vy_mps, velocity.vyaw_radps)

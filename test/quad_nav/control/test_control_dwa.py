@@ -112,3 +112,20 @@ def test_cost_cloud_holds_the_cells_a_robot_could_be_in():
     np.testing.assert_allclose(row[:3], [-1.375, -1.475, 0.0], atol=1e-6)
     assert row[3:6].tolist() == [58, 87, 100]
     assert row[6] == pytest.approx(0.05 * (0.6 * 58 + 0.8 * 87) + 0.01 * 100)
+
+
+@pytest.mark.parametrize(
+    "pose, restricted",
+    [
+        (Pose2D(1.04, 1.0), True),
+        (Pose2D(1.06, 1.0), False),
+        (Pose2D(1.0, 1.0, 0.19), True),
+        (Pose2D(1.0, 1.0, -0.21), False),
+    ],
+)
+def test_restrictions_end_by_moving_or_turning(pose, restricted):
+    critic = noted(OscillationCritic(), (0.0, 0.2, 0.0), (0.0, -0.2, 0.0), pose=Pose2D(1.0, 1.0))
+    assert critic.strafe.negative_only
+    noted(critic, (0.0, 0.0, 0.0), pose=pose)
+    assert critic.strafe.is_restricted == restricted
+    assert critic.strafe.going_negative == restricted

@@ -69,3 +69,9 @@ def test_costs_are_what_they_were_after_the_search():
             np.testing.assert_array_equal(costmap.costs[~edge], before[~edge])
             raise PlanningError("no plan")
     np.testing.assert_array_equal(costmap.costs, before)
+
+
+def test_a_gap_as_wide_as_the_strip_is_no_way():
+    navigator = navigator_with()
+    with pytest.raises(PlanningError):
+        navigator.make_plan(START, GOAL)

@@ -6,11 +6,18 @@ import numpy as np
 import pytest
 from costmap_maps import costs_of
 
-from quad_nav.errors import GoalOutsideMap, StartOutsideMap
+from quad_nav.errors import GoalOutsideMap, NoPath, StartOutsideMap
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import INSCRIBED, LETHAL, UNKNOWN, GridSpec
 from quad_nav.plan.global_planner import SearchPlanner, SearchPlannerParams, wave_params
 
+FIELD = """
+    .........
+    .........
+    .........
+    .........
+    .........
+"""
 WALL = """
     ...........
     .....#.....
@@ -95,3 +102,15 @@ def test_start_and_goal_off_the_map():
         plan_of(costs_of(CORRIDOR), (-1, 1), (5, 1))
     with pytest.raises(GoalOutsideMap, match=r"\(9\.50, 1\.50\)"):
         plan_of(costs_of(CORRIDOR), (1, 1), (9, 1))
+
+
+@pytest.mark.parametrize("params", SEARCHES)
+def test_without_an_outline_the_border_may_be_used(params):
+    costs = costs_of(FIELD)
+    planner, plan = planned(costs, (0, 0), (8, 4), 0.6, outline_map=False, **params)
+    np.testing.assert_allclose(plan[0, :2], 0.5 if params["use_grid_path"] else 0.6, atol=1e-6)
+    assert plan[-1].tolist() == [8.6, 4.6, 0.7]
+    assert planner.potential.shape == costs.shape
+    assert LETHAL not in costs
+    with pytest.raises(NoPath):
+        plan_of(costs, (0, 0), (8, 4), 0.6, **params)

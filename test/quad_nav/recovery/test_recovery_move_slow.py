@@ -220,3 +220,8 @@ class SimpleController:
 
     def set_params(self, params):
         self.params = params
+
+
+def test_a_clock_that_jumps_back_lifts_the_limit(stuck):
+    stuck.navigator.restart(0.0)
+    assert stuck.max_vel_x_mps == 0.6
