@@ -38,8 +38,7 @@ class FreeFlight:
         self, scene: Scene, n_robots: int, radius_m: float, law: FlightLaw, step_s: float
     ) -> None:
         self._scene = scene
-        self._law = law
-        self._step_s = step_s
+        self._rules = (step_s, scene.altitude_m, law.constants, law.gains)
         # Radius of a sphere that contains the guard at any tilt.
         self._reach_m = math.hypot(radius_m, GUARD_HEIGHT_M / 2) + _MARGIN_M
         self._space = FreeSpace(
@@ -82,17 +81,9 @@ class FreeFlight:
             steps = min(steps, _MOVING_STEPS)
             poses = moving_poses(steps)
         while done < steps:
+            moving = self._moving._replace(poses=poses[done:])
             more, found, other = fly_freely(
-                rows,
-                commands,
-                excluded,
-                steps - done,
-                self._step_s,
-                self._scene.altitude_m,
-                self._law.constants,
-                self._law.gains,
-                self._space,
-                self._moving._replace(poses=poses[done:]),
+                rows, commands, excluded, steps - done, *self._rules, self._space, moving
             )
             done += more
             if other == MOVING:
