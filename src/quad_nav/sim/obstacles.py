@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from typing import Any, Callable, ClassVar, Dict, Mapping, Sequence, Tuple, Type, cast
 
 import numpy as np
@@ -110,11 +111,10 @@ class Obstacle(ABC):
     def distances_to(cls, obstacles: Sequence[Any]) -> Callable[[float, float, float], Floats]:
         """Return a function of (x, y, z) for ``surface_distance_m`` of many of this shape.
 
-        Its result is float64[n]. A shape that scenes have thousands of has a faster one.
+        Its result is float64[n]. A shape that scenes have thousands of has a faster one. It can be
+        pickled, because scenes are sent to other processes.
         """
-        return lambda x_m, y_m, z_m: np.array(
-            [one.surface_distance_m(x_m, y_m, z_m) for one in obstacles]
-        )
+        return partial(_distances_to_each, obstacles)
 
     @property
     def top_m(self) -> float:
@@ -210,15 +210,7 @@ class Box(Obstacle):
         halves = np.array([[box.size_x_m, box.size_y_m, box.height_m] for box in obstacles]) / 2
         cos = np.array([math.cos(box.yaw_rad) for box in obstacles])
         sin = np.array([math.sin(box.yaw_rad) for box in obstacles])
-
-        def distances_m(x_m: float, y_m: float, z_m: float) -> Floats:
-            dx, dy, dz = ((x_m, y_m, z_m) - centres).T
-            local = (*rotate_vectors(cos, -sin, dx, dy), dz)
-            outside = np.abs(local).T - halves
-            distances: Floats = _signed_distance((outside[:, 0], outside[:, 1], outside[:, 2]))
-            return distances
-
-        return distances_m
+        return partial(_distances_to_boxes, centres, halves, cos, sin)
 
 
 class _Round(Obstacle):
@@ -270,14 +262,7 @@ class Cylinder(_Round):
         centres = np.array([one.centre_m for one in obstacles])
         radii = np.array([one.radius_m for one in obstacles])
         half_heights = np.array([one.height_m / 2 for one in obstacles])
-
-        def distances_m(x_m: float, y_m: float, z_m: float) -> Floats:
-            dx, dy, dz = ((x_m, y_m, z_m) - centres).T
-            outside = (np.hypot(dx, dy) - radii, np.abs(dz) - half_heights)
-            distances: Floats = _signed_distance(outside)
-            return distances
-
-        return distances_m
+        return partial(_distances_to_cylinders, centres, radii, half_heights)
 
 
 @dataclass(frozen=True)
@@ -335,3 +320,25 @@ def _signed_distance(outside_m: Tuple[Any, ...]) -> Any:
     for d in outside_m[1:]:
         deepest_m = np.maximum(deepest_m, d)
     return np.where(distance_m > 0.0, distance_m, deepest_m)[()]
+
+
+def _distances_to_each(obstacles: Sequence[Obstacle], x_m: float, y_m: float, z_m: float) -> Floats:
+    return np.array([one.surface_distance_m(x_m, y_m, z_m) for one in obstacles])
+
+
+def _distances_to_boxes(
+    centres: Floats, halves: Floats, cos: Floats, sin: Floats, x_m: float, y_m: float, z_m: float
+) -> Floats:
+    dx, dy, dz = ((x_m, y_m, z_m) - centres).T
+    local = (*rotate_vectors(cos, -sin, dx, dy), dz)
+    outside = np.abs(local).T - halves
+    distances: Floats = _signed_distance((outside[:, 0], outside[:, 1], outside[:, 2]))
+    return distances
+
+
+def _distances_to_cylinders(
+    centres: Floats, radii: Floats, half_heights: Floats, x_m: float, y_m: float, z_m: float
+) -> Floats:
+    dx, dy, dz = ((x_m, y_m, z_m) - centres).T
+    distances: Floats = _signed_distance((np.hypot(dx, dy) - radii, np.abs(dz) - half_heights))
+    return distances

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from size_limit import size_limit
 from study_flights import FLOWN, SPACE, write_mission
-from test_record_files import SizeLimit
 
 from quad_nav.cli import main
 from quad_nav.files import output
@@ -72,7 +72,7 @@ def test_files_that_cannot_be_written(tmp_path, monkeypatch):
 
 
 def test_a_full_disk_is_noticed_before(tmp_path):
-    with SizeLimit(100):  # an empty file would fit
+    with size_limit(100):  # an empty file would fit
         assert refusal(tmp_path / "x.json") == "File too large"
         (line,) = folder_faults(tmp_path / "new", "--png")
     assert line == (
@@ -151,7 +151,7 @@ def test_every_output_is_checked_first(tmp_path, command, option, name):
         assert done.exit_code == 2, done.output
         assert f"  {option}: {folder / name}: cannot be written: {why}; expected" in done.output
         assert not folder.is_dir()
-    with SizeLimit(100):
+    with size_limit(100):
         done = run(*command.split(), option, tmp_path / name)
     assert done.exit_code == 2 and "cannot be written: File too large" in done.output
     assert names(tmp_path) == ["file"]
@@ -188,7 +188,7 @@ def test_table_is_printed_if_a_picture_cannot_be_written(tmp_path, full_disk, op
 
 
 def test_a_quiet_flight_tells_that_its_recording_failed(tmp_path):
-    with SizeLimit(5_000):
+    with size_limit(5_000):
         done = run(*FLY, "--record", tmp_path / "x.bag")
     assert (done.exit_code, done.output) == (
         1,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import errno
 import os
-import resource
 
 import pytest
+from size_limit import size_limit
 
 from quad_nav.errors import InputError
 from quad_nav.mission.journal import Journal, encode
@@ -136,14 +136,10 @@ def test_a_full_disk_is_reported_once_and_the_journal_catches_up(tmp_path, monke
 
 def test_a_file_at_its_size_limit_keeps_whole_lines(tmp_path):
     """The operating system refuses to write in the middle of a line."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
     kept = Journal(tmp_path / "j")
     kept.start({"head": 1})
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20, before[1]))
-    try:
+    with size_limit(20):
         assert "cannot be written: File too large" in kept.append({"goal": 2})
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert lines(tmp_path / "j") == [b'{"head": 1}']
     assert kept.flush().endswith("nothing is missing")
     assert lines(tmp_path / "j") == [b'{"head": 1}', b'{"goal": 2}']

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import resource
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from recorded_flight import setup
 from rosbags.rosbag1 import Reader
+from size_limit import size_limit
 
 from quad_nav.cli import main
 from quad_nav.errors import InputError
@@ -78,17 +78,6 @@ def test_a_flight_that_ends_early_leaves_a_recording(tmp_path, fails, reason):
         summary = fly(setup(tmp_path), [Recorder(path), Stop(fails)])
         assert (fails, summary.reason, summary.success) == (False, INTERRUPTED, False)
     assert read(path, FLIGHT_TOPIC)[-1].content.reason == reason
-
-
-@contextlib.contextmanager
-def size_limit(size):
-    """No file can grow beyond so many bytes, as if the disk were full."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def test_a_full_disk_ends_the_flight_and_what_was_recorded_is_readable(tmp_path):
