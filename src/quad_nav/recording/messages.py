@@ -92,7 +92,7 @@ def message(kind: str, *fields: Any) -> Any:
 def _layout(kind: str) -> Tuple[Any, Tuple[str, ...]]:
     """Return the class of a type, and the type of each field that is a message, else ""."""
     name = long_name(kind)
-    fields = (field for _, field in _STORE.fielddefs[name][1])
+    fields = (field for _, field in _STORE.get_msgdef(name).fields)
     return _STORE.types[name], tuple(
         own.replace("/msg/", "/") if node == Nodetype.NAME else "" for node, own in fields
     )
