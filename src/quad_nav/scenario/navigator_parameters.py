@@ -16,6 +16,7 @@ from quad_nav.config.files import ParameterTree
 from quad_nav.config.robot_tree import COMMAND_LINE
 from quad_nav.errors import InputError
 from quad_nav.scenario.coverage import COSTMAP, cover_area
+from quad_nav.scenario.rules import RULES
 
 COVER_SCENE, OVERRIDE = "cover_scene", "override"
 _ANY_NUMBER = 0  # of the robot, which only matters to files that are named after robots
@@ -66,7 +67,10 @@ def _sized(
 ) -> Dict[str, Any]:
     from quad_nav.scenario.scenario import area_of  # here: it needs more than a navigator does
 
-    area = area_of({"scene": "", "robots": 2, "seed": 0, "size": 0.0, **simulator})
+    values = {"scene": "", "robots": 2, "seed": 0, "size": 0.0, **simulator}
+    if any(not RULES[name].accepts(values[name]) for name in ("scene", "robots", "seed", "size")):
+        return dict(parameters)  # the simulator tells what is wrong
+    area = area_of(values)
     if area is None:
         return dict(parameters)
     tree = ParameterTree()

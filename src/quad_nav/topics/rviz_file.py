@@ -139,7 +139,9 @@ def arguments(words: Sequence[str]) -> Tuple[argparse.Namespace, List[str]]:
     """Parse the command line; the second value holds the unknown words, for RViz."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("--robots", type=int, required=True)
-    parser.add_argument("--scene", default=RANDOM)
+    # vehicles.launch gives no scene for a room that is unknown: the arena has its size, about.
+    arena = str(shipped("scenes", "arena.yaml"))
+    parser.add_argument("--scene", default=RANDOM, nargs="?", const=arena)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--size", type=float, default=0.0)
     return parser.parse_known_args(words)

@@ -17,6 +17,7 @@ No other file touches what is private in rospy.
 
 from __future__ import annotations
 
+import contextlib
 import socket
 import sys
 import threading
@@ -106,8 +107,10 @@ def hear_first(subscriber: rospy.Subscriber, on_first: Callable[[], object]) -> 
     """Call a function with the first message of a subscriber, beside its own callback."""
 
     def on_message(_: Any) -> None:
-        if is_registered(subscriber):
-            subscriber.impl.remove_callback(on_message, None)
+        # The threads of two publishers can both have a first message.
+        with contextlib.suppress(KeyError):
+            if is_registered(subscriber):
+                subscriber.impl.remove_callback(on_message, None)
         on_first()
 
     subscriber.impl.add_callback(on_message, None)

@@ -171,7 +171,9 @@ class IntentionListener:
                 )
             received = self._in_own_frame(received, frame)
         except (ValueError, TransformUnavailable) as error:
-            self._warnings.warn(f"{INTENTIONS_TOPIC}: intentions dropped: {error}")
+            self._warnings.warn(
+                f"{INTENTIONS_TOPIC}: intentions dropped: {error}", kind=INTENTIONS_TOPIC
+            )
             return
         self._own_topics.hear(np.array(list(received), np.int64))
         for robot, intention in received.items():
@@ -187,7 +189,8 @@ class IntentionListener:
                 intention = self._in_own_frame({number: intention}, frame)[number]
             except TransformUnavailable as error:
                 self._warnings.warn(
-                    f"quad{number}: intention dropped, expecting straight flight: {error}"
+                    f"quad{number}: intention dropped, expecting straight flight: {error}",
+                    kind=f"quad{number}",
                 )
                 self._intentions.pop(number, None)
                 return

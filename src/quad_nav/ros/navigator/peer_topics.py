@@ -108,7 +108,8 @@ class PeerTopics:
             pose = self._transforms.lookup_near(self._frame, states.frame, stamp)
         except TransformUnavailable as error:
             self._warnings.warn(
-                f"{STATES_TOPIC}: states dropped: pose in {self._frame} unknown: {error}"
+                f"{STATES_TOPIC}: states dropped: pose in {self._frame} unknown: {error}",
+                kind=STATES_TOPIC,
             )
             return False
         self._store(states, pose.to_2d())
@@ -200,7 +201,10 @@ class PeerTopics:
                 header.stamp.to_sec(), rospy.get_time()
             )
         if problem:
-            self._warnings.warn(f"quad{number}: odometry dropped, ignoring this peer: {problem}")
+            self._warnings.warn(
+                f"quad{number}: odometry dropped, ignoring this peer: {problem}",
+                kind=f"quad{number}",
+            )
             return None
         linear, angular = twist.linear, twist.angular
         return (

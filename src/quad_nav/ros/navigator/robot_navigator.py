@@ -17,6 +17,7 @@ from quad_nav.errors import PluginError
 from quad_nav.geometry import Pose3D, Twist2D
 from quad_nav.navigator.tick import RobotPoses
 from quad_nav.ros.common.conversions import odometry_from_message
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator import sensors, static_maps
 from quad_nav.ros.navigator.health_meters import InputMeter
@@ -57,6 +58,7 @@ class RobotNavigator(NavigatorHost):
         self._odometry_s: Optional[float] = None  # of the last message, at first of the first step
         self._start_s: Optional[float] = None  # when it starts at the latest, set by the first step
         self._transforms, self._peers = transforms, peers
+        self._warnings = ThrottledWarnings()
         self._odometry_meter = InputMeter(rospy.resolve_name(names("odom")))
         self._odometry = rospy.Subscriber(names("odom"), Odometry, self._on_odometry, queue_size=1)
         self._sensors = sensors.connect(self, names)
@@ -67,7 +69,7 @@ class RobotNavigator(NavigatorHost):
             names,
             [self._odometry_meter, *(sensor.meter for sensor in self._sensors)],
         )
-        self._warnings, self.health = self._interface.warnings, self._interface.health
+        self.health = self._interface.health
 
     @property
     def subscribers(self) -> List[rospy.Subscriber]:
