@@ -99,6 +99,10 @@ def database_faults(database: sqlite3.Connection) -> List[str]:
     ((found,),) = database.execute("PRAGMA integrity_check(1)")
     if found != "ok":
         return [f"is damaged: {found}"]
+    found = database.execute("SELECT name FROM sqlite_master WHERE type IN ('view', 'trigger')")
+    other = [name for (name,) in found]
+    if other:  # they could read without an end, or change what is written
+        return [f"has {name}, which no study has" for name in other]
     orphans = {(table, parent) for table, _, parent, _ in database.execute(_ORPHANS)}
     return [f"rows of {table} have lost their {parent}" for table, parent in sorted(orphans)]
 

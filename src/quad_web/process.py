@@ -17,6 +17,7 @@ import threading
 import time
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import ForkingPickler
 from typing import Any, Dict, FrozenSet, List, Optional, Tuple
 
 from quad_nav.errors import InputError
@@ -62,17 +63,17 @@ class Channel:
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
-        self._outgoing: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._outgoing: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         threading.Thread(target=self._write, name="channel", daemon=True).start()
 
     def send(self, message: Any) -> None:
-        """Send a message; it is lost if the other end is gone."""
-        self._outgoing.put(message)
+        """Send a message as it is now; it is lost if the other end is gone."""
+        self._outgoing.put(bytes(ForkingPickler.dumps(message)))
 
     def _write(self) -> None:
         with contextlib.suppress(OSError, TypeError):  # the latter if it is closed meanwhile
             while True:
-                self._connection.send(self._outgoing.get())
+                self._connection.send_bytes(self._outgoing.get())
 
     def receive(self, timeout_s: float = 0.0) -> List[Any]:
         """Return the messages that are here; wait for the first one until time is up.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Callable, List, Optional, Tuple
 
 import numpy as np
@@ -87,16 +87,23 @@ class Observation:
         self.stamp_ns = _nanoseconds(stamp_s)
         self.some_mark = make_marks is not None
         self._make_points, self._make_marks = make_points, make_marks
+        # Not cached_property: before Python 3.12 it has one lock for all robots of a process.
+        self._points: Optional[NDArray[np.float32]] = None
+        self._marks: Optional[NDArray[np.float32]] = None
 
-    @cached_property
+    @property
     def points(self) -> NDArray[np.float32]:
         """float32[n, 3], metres."""
-        return self._make_points()
+        if self._points is None:
+            self._points = self._make_points()
+        return self._points
 
-    @cached_property
+    @property
     def marks(self) -> NDArray[np.float32]:
         """float32[m, 3], the points that mark, metres."""
-        return self.points if self._make_marks is None else self._make_marks()
+        if self._marks is None:
+            self._marks = self.points if self._make_marks is None else self._make_marks()
+        return self._marks
 
 
 class ObservationBuffer:

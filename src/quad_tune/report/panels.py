@@ -86,8 +86,12 @@ def paper_figure(plot: Plot) -> Figure:
     for axes, title in zip(panels.values(), style.get("annotations", ())):
         axes.set_title(_words(title["text"]), fontsize=8 if len(columns) > 2 else None)
     if style.get("showlegend", True):
-        handles = panels[names[0]].get_legend_handles_labels()[0]
-        robot_legend(figure, (), [one for one in handles if one.get_label()])
+        handles: Dict[str, Any] = {}
+        for axes in panels.values():
+            for handle, name in zip(*axes.get_legend_handles_labels()):
+                handles.setdefault(name, handle)
+        handles.pop("", None)
+        robot_legend(figure, (), list(handles.values()))
     return figure
 
 
@@ -172,7 +176,11 @@ def _heatmap(axes: Axes, trace: Json) -> None:
     scale = scale.reversed() if trace["reversescale"] else scale
     cells = np.array([_known(line) for line in trace["z"]])
     limits = {"vmin": trace["zmin"], "vmax": trace["zmax"]}
-    axes.imshow(cells, aspect="auto", origin="lower", cmap=scale, alpha=trace["opacity"], **limits)
+    image = axes.imshow(
+        cells, aspect="auto", origin="lower", cmap=scale, alpha=trace["opacity"], **limits
+    )
+    if not any(map(any, trace["text"])):  # the cells are too many for numbers
+        axes.figure.colorbar(image, ax=axes)
     for (i, j), _ in np.ndenumerate(cells):
         words = _words(trace["text"][i][j])
         axes.text(j, i, words, color=trace["textfont"]["color"], ha="center", va="center", size=7)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Set, Tuple
 
 import numpy as np
 import optuna
@@ -255,6 +255,7 @@ def slices_plot(result: TuneResult, order: Sequence[str], reference: float) -> P
     trials, by_path = result.trials, {one.path: one for one in result.setup.space.dimensions}
     ends = cost_axis(trials, reference)
     panels: List[Panel] = []
+    named: Set[str] = set()  # a value that only some panels have is named by the first of them
     for path in order:
         dimension = by_path[path]
         places = [_place(dimension, trial.params[path]) for trial in trials]
@@ -268,7 +269,11 @@ def slices_plot(result: TuneResult, order: Sequence[str], reference: float) -> P
             if value is not None
         ]
         traces = [*_costs(trials, places, reference), *lines]
-        traces = [{**one, "legendgroup": one["name"], "showlegend": not panels} for one in traces]
+        traces = [
+            {**one, "legendgroup": one["name"], "showlegend": one["name"] not in named}
+            for one in traces
+        ]
+        named.update(one["name"] for one in traces)
         title = "<br>".join(map(plot_text, path.rsplit("/", 1)))
         panels.append(Panel(title, traces, _value_axis(dimension), axis("", range=ends)))
     name = "Cost over the values of each parameter"

@@ -210,7 +210,8 @@ export function outlineOf({ outline, x, y, yaw }) {
 /** Return the obstacle or wall that covers a point, null if there is none. */
 export function solidAt({ scene, obstacles }, x, y) {
   const solids = [...(obstacles ?? []), ...(scene?.solids ?? []), ...(scene?.walls ?? [])];
-  return solids.find((solid) => covers(outlineOf(solid), x, y)) ?? null;
+  const isNear = (solid) => Math.hypot(x - solid.x, y - solid.y) <= solid.reach;
+  return solids.find((solid) => isNear(solid) && covers(outlineOf(solid), x, y)) ?? null;
 }
 
 /** Return whether a polygon covers a point: a ray from there along x crosses an odd side. */
