@@ -36,7 +36,8 @@ def player(path):
     state, clock = FleetState(), Clock()
     replay = Replay(path, state, clock)
     replay.read()
-    return replay, state, clock
+    yield replay, state, clock
+    replay.release()
 
 
 def step(player, wall_s: float = 0.0):
@@ -147,6 +148,7 @@ def test_while_the_file_is_read_the_page_says_how_far_it_is(path, monkeypatch):
     replay.step()
     assert state.item("flight").data["state"] == "paused"
     assert state.item("flight").data["time_s"] == 1.0
+    replay.release()
 
 
 def test_a_replay_steers_nothing(player):

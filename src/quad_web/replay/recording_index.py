@@ -33,7 +33,11 @@ class RecordingIndex:
         with recording_faults(path):
             self._reader = Reader(path)
             self._reader.open()
-            kinds = wanted_kinds(path, self._reader, wanted)
+            try:
+                kinds = wanted_kinds(path, self._reader, wanted)
+            except BaseException:
+                self._reader.close()
+                raise
             for connection in self._reader.connections:
                 if connection.id in kinds:
                     topic = connection.topic

@@ -128,6 +128,8 @@ class Replay(Actions):
                         self._changed.wait(PERIOD_S)
         except InputError as error:
             self.faults = error.problems
+        else:
+            self.release()
         finally:
             self.is_read.set()
 
@@ -141,6 +143,10 @@ class Replay(Actions):
         self._time_s = self._flight.start_s
         self._state.put_all([*self._flight.static_items, self._flight_item()])
         self.is_read.set()
+
+    def release(self) -> None:
+        """Close the file that ``read`` has opened; ``run`` does so at its end."""
+        self._flight.close()
 
     def close(self) -> None:
         """End ``run``."""
