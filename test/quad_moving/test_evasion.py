@@ -125,6 +125,11 @@ def test_a_wall_closes_a_side():
     assert found.velocity.vy_mps > -0.05 and not found.velocity.is_zero
 
 
+def test_a_robot_that_is_too_near_to_what_stands_is_left_to_the_navigator():
+    costs, command = np.full(SPEC.shape, LETHAL, np.uint8), Command(AHEAD)
+    assert evade(command, tracks([2.0, 0.0, -1.0, 0.0]), costs=costs) is command
+
+
 def test_where_no_velocity_is_clear_the_robot_flees():
     """In a corridor something comes faster than the robot can fly back."""
     costs = np.zeros(SPEC.shape, np.uint8)

@@ -128,6 +128,17 @@ def test_every_command_of_a_robot_without_data_is_zero(does, lose):
     assert all(periods > 0.1 - 1e-6)  # the control period
 
 
+@pytest.mark.parametrize("lose", [no_scans, no_odometry])
+def test_a_cancel_without_data_is_a_stop(lose):
+    flight = Threatened()
+    controls(flight)
+    flight.ticks(2.0)
+    poses, _ = lose(flight)
+    flight.navigator.cancel()
+    ticks = flight.ticks(2.0, poses)
+    assert [tick.command for tick in ticks if tick.command] == [Twist2D()]
+
+
 @pytest.mark.parametrize("frequency_hz", [2.0, 20.0])
 def test_an_idle_robot_evades_at_a_changed_frequency(frequency_hz):
     flight = Threatened()

@@ -132,6 +132,17 @@ def test_a_field_of_thin_pillars_does_not_move():
         assert len(tracker.known) == 0
 
 
+@pytest.mark.parametrize("x_m, yaw_rad", [(0.4, 0.0), (0.0, 1.0)])
+def test_jumps_of_the_pose_move_nothing(x_m, yaw_rad):
+    """The localisation of a LIDAR that stands is corrected every second."""
+    tracker = new_tracker()
+    for now_s in times(6.0):
+        jumps = int(now_s)
+        pose = pose_at(jumps * x_m, 0.0, jumps * yaw_rad)
+        tracker.add_scan("scan", scan_of(now_s, PILLARS), pose)
+        assert len(tracker.known) == 0
+
+
 def test_an_obstacle_that_passes_behind_a_pillar_keeps_its_number():
     numbers, hidden_s = [], []
     for now_s, _, tracker in track(lambda t: ((2.0, 0.0, 0.3), (4.0, -3.0 + t, 0.25)), times(6.0)):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from quad_bench.barn import arrays
 from quad_nav import errors
@@ -103,6 +104,18 @@ def test_a_costmap_takes_a_gigabyte_at_most(layers, bytes_per_cell, side_m):
     problem = workload.size_problem(costmap(side_m + 0.1, *layers))
     assert f"cells of {bytes_per_cell} bytes each take 1.00" in problem
     assert "larger resolution" in problem
+
+
+@pytest.mark.parametrize(
+    "mode, side", [("L", 10000), ("RGB", 10000), ("LA", 10000), ("RGBA", 9128), ("I", 8770)]
+)
+def test_an_image_takes_a_gigabyte_at_most(mode, side):
+    image = Image.new(mode, (1, 1))
+    image._size = (side, side)  # as after reading no more than the head of the file
+    map_image._check_size(Path("map.png"), image)
+    image._size = (side + 1, side + 1)
+    with pytest.raises(InputError, match="of memory; expected 1 GB at most|pixels, expected 1 to"):
+        map_image._check_size(Path("map.png"), image)
 
 
 def test_a_map_on_a_topic_takes_a_gigabyte_at_most():

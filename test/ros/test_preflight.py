@@ -10,8 +10,10 @@ import unittest
 from pathlib import Path
 
 import rostest
+from roslaunch.config import load_config_default
 
-CONFIG = Path(__file__).resolve().parents[2] / "config" / "default"
+ROOT = Path(__file__).resolve().parents[2]
+CONFIG = ROOT / "config" / "default"
 COLLECT = {**os.environ, "QUAD_COLLECT_FAULTS": "1"}
 
 
@@ -56,6 +58,13 @@ class Preflight(unittest.TestCase):
         self.assertNotIn("costmap, x", errors)
         written = json.loads(result.read_text())
         self.assertEqual((written["exit_status"], len(written["problems"])), (2, 3))
+
+    def test_navigators_of_another_package_are_nodes_also_if_composed(self):
+        file = str(ROOT / "launch" / "two_quads.launch")
+        arguments = ["nav:=move_base", "composed:=true", "rviz:=false"]
+        nodes = load_config_default([(file, arguments)], None, verbose=False).nodes
+        found = [node.name for node in nodes if node.package == "move_base"]
+        self.assertEqual(found, ["move_base0", "move_base1"])
 
     def test_goals_off_the_global_costmap_are_refused(self):
         own = self.folder / "own.yaml"

@@ -93,6 +93,19 @@ def test_a_standing_robot_may_repeat_its_scan_also_after_a_correction_of_its_pos
         assert judge.rejection_reason(scan(1.0 + tick), at(0.3), 1.0 + tick) == ""
 
 
+@pytest.mark.parametrize(
+    "field_rad, turn_rad, lost, is_accepted",
+    [(math.pi, 0.8, 50, True), (math.pi, 0.7, 50, False), (2 * math.pi, 0.8, 30, False)],
+)
+def test_a_turn_takes_returns_out_of_a_field_of_view_that_is_not_full(
+    field_rad, turn_rad, lost, is_accepted
+):
+    """With half a circle a turn of 0.8 rad may lose 25 + 25.4 beams."""
+    turned = scan(1.1, some(math.inf, lost), field_rad)
+    reason = after_a_scan(field_rad=field_rad).rejection_reason(turned, at(0.0, turn_rad), 1.1)
+    assert (reason == "") is is_accepted
+
+
 def test_a_single_beam_may_turn_away():
     # Its field of view is 0 rad: a division by it ended the navigator.
     beam, lost = Scan(1.0, 0.0, 0.0, 0.02, 60.0, WALL[:1]), np.array([math.inf], np.float32)

@@ -127,6 +127,15 @@ def test_no_filter_moves_a_robot_without_data(does, lose):
     assert any(tick.is_stopped for tick in found) and pushes.resets > 0
 
 
+def test_a_clock_that_jumps_back_resets_the_filters():
+    watches = Replaces(None)
+    flight = flight_with(watches)
+    for costmap in (flight.global_costmap, flight.local_costmap):
+        costmap.reset_layers = lambda now_s: None
+    flight.navigator.restart(0.0)
+    assert watches.resets == 1
+
+
 def test_upstream_goes_on_recovering_without_scans():
     flight = Flight(
         [NamedRecovery("rotate", FakeRecovery(steps=1000))], UPSTREAM, [], planner_patience_s=0.2

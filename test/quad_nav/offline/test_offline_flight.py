@@ -199,6 +199,11 @@ def test_every_fault_is_reported_at_once(tmp_path):
     assert "is inside an obstacle" in told
 
 
+def test_frames_that_the_simulation_lacks_are_refused():
+    with pytest.raises(InputError, match="quad0: global_frame: world; expected map or odom0"):
+        read_setup(options(parameters=(("local_costmap/global_frame", "world"),)))
+
+
 def test_without_files_a_random_mission_is_made_and_the_costmaps_cover_it():
     setup = read_setup(options(scene=None, goals=None, robots=10))
     assert len(setup.robots) == len(setup.scene.starts) == 10

@@ -90,6 +90,10 @@ def test_the_older_goal_goes_first_and_then_the_lower_number():
     assert priority_of(10.0, 7) > priority_of(11.0, 0) > priority_of(11.0, 1) > idle_priority(0)
 
 
+def test_no_robot_yields_to_a_parked_peer():
+    assert decide(EAST, idle_priority(1), [peer(1.0, 0.0)]) is None
+
+
 def test_a_robot_waits_beside_the_path_of_a_peer_and_makes_room_on_it():
     first = peer(1.0, 0.0, priority=HIGHEST_PRIORITY, path=[(1.0, 0.0), (6.0, 0.0)])
     assert decide([(2.5, -1.2), (2.5, 3.0)], -1.0, [first]) == ("other", Yield.WAIT)

@@ -15,7 +15,7 @@ import pytest
 from quad_nav.config import load, updated
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import LETHAL
-from quad_nav.peers.peer import Intention, Peer
+from quad_nav.peers.peer import HIGHEST_PRIORITY, Intention, Peer
 from quad_nav.peers.roundabout import Roundabout
 from quad_nav.scenario.assembly import apply_configuration, build_navigator
 
@@ -70,6 +70,24 @@ def test_four_that_meet_keep_right_of_a_circle_with_room_for_all(roundabout):
     assert roundabout.members == {"quad1", "quad2", "quad3"}
     expected = [(5.0, 5.0 + k * RADIUS_M) for k in range(4)]  # its left is north
     np.testing.assert_allclose(roundabout.barrier(START), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "third",
+    [
+        pytest.param(peer("quad3", (5.0, 7.4), (5.0, 2.0), HIGHEST_PRIORITY), id="no intention"),
+        pytest.param(NORTH.with_intention(Intention()), id="parked"),
+    ],
+)
+def test_who_sends_no_intention_or_is_parked_does_not_keep_right(roundabout, third):
+    update(roundabout, [EAST, SOUTH, third])
+    assert roundabout.centre is None
+
+
+def test_who_is_silent_does_not_keep_right(roundabout):
+    for _ in range(2):
+        assert roundabout.update(1.0, START, ALL, TIMEOUT_S) == []  # as of 0 s
+    assert roundabout.centre is None
 
 
 @pytest.mark.filterwarnings("error")
@@ -136,3 +154,15 @@ def test_a_circle_has_to_be_free(navigator, roundabout, x_m, y_m, is_free):
     navigator.global_costmap.costs[int(10 * y_m), int(10 * x_m)] = LETHAL
     update(roundabout, ALL)
     assert (roundabout.centre is not None) == is_free
+
+
+def test_a_circle_has_to_be_on_the_map(roundabout):
+    """They meet at (5, 0.5)."""
+    roundabout.start(Pose2D(8.0, 0.5))
+    peers = [
+        peer("quad1", (7.4, 0.5), (2.0, 0.5)),
+        peer("quad2", (5.0, -1.9), (5.0, 4.0)),
+        peer("quad3", (5.0, 2.9), (5.0, -2.0)),
+    ]
+    update(roundabout, peers, Pose2D(2.6, 0.5))
+    assert roundabout.centre is None

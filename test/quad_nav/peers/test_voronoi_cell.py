@@ -9,7 +9,7 @@ import pytest
 
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.peers.peer import Peer
-from quad_nav.peers.voronoi_cell import Cell
+from quad_nav.peers.voronoi_cell import COASTING_S, Cell
 
 SAFETY_RADIUS_M = 0.4
 STANDING = Twist2D()
@@ -26,6 +26,11 @@ def cell(*peers, at=(0.0, 0.0, 0.0), velocity=STANDING, hold_s=1.0):
 def test_a_command_ends_at_the_border_of_the_cell():
     # 1.2 m apart: 0.6 m to the middle, less 0.4 m, leaves 0.2 m of the 0.4 m in 1 s.
     assert cell(peer(1.2, 0.0)).limit(Twist2D(0.4)) == (Twist2D(pytest.approx(0.2)), "other")
+
+
+def test_the_coasting_distance_counts():
+    coasting = cell(peer(1.2, 0.0), velocity=Twist2D(0.1 / COASTING_S))  # carries 0.1 m of the 0.2
+    assert coasting.limit(Twist2D(0.4))[0] == Twist2D(pytest.approx(0.1))
 
 
 @pytest.mark.parametrize(

@@ -88,6 +88,22 @@ def test_costmaps_that_cannot_be_cleared_are_reported():
     assert (small.layers["laser"].grid.costs == 254).all()
 
 
+def test_at_an_unknown_pose_nothing_is_cleared_or_limited():
+    costmap = full(costmap_of())
+    step = MoveSlowAndClear(MoveSlowAndClearParams()).step(
+        RecoveryContext(0.0, costmap, costmap, None, None)
+    )
+    assert step.done and step.limit is None
+    assert step.message.count("robot pose unknown") == 2
+    assert (costmap.layers["laser"].grid.costs == 254).all()
+
+
+def test_a_limit_never_raises_a_speed():
+    controller = Controller(TrajectoryPlannerParams(max_vel_x_mps=0.1))
+    ParameterLimiter(controller).impose(LIMIT, HERE, 0.0)
+    assert controller.params.max_vel_x_mps == 0.1
+
+
 def test_parameters_that_change_under_a_limit_take_effect_with_its_end():
     controller = Controller(TrajectoryPlannerParams())
     speed = ParameterLimiter(controller)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -82,3 +83,10 @@ def test_drawings_have_its_extent(solid):
     middle = solid.bottom_m + solid.height_m / 2
     for x_m, y_m in solid.outline_m():
         assert solid.surface_distance_m(x_m, y_m, middle) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("solid", EXAMPLES.values(), ids=EXAMPLES)
+def test_a_scene_whose_distances_were_asked_for_can_be_sent_to_another_process(solid):
+    scene = scene_with(solid)
+    distance_m = scene.flight_surface_distance_m(2.5, 5.0)
+    assert pickle.loads(pickle.dumps(scene)).flight_surface_distance_m(2.5, 5.0) == distance_m
