@@ -158,9 +158,10 @@ def test_obstacles_are_found_under_the_pointer(run):
     body = """
         const around = (a, b) => [[a, b], [-a, b], [-a, -b], [a, -b]];
         const diamond = [[0.5, 0], [0, 0.5], [-0.5, 0], [0, -0.5]];
-        const box = { x: 1, y: 1, outline: around(1, 0.1), yaw: Math.PI / 2, name: "box" };
-        const pillar = { x: 4, y: 0, outline: diamond, yaw: 0, name: "pillar" };
-        const cart = { x: 4, y: 3, outline: around(0.5, 0.5), yaw: 0, name: "cart" };
+        const box = { x: 1, y: 1, outline: around(1, 0.1), reach: 1.1, yaw: Math.PI / 2,
+          name: "box" };
+        const pillar = { x: 4, y: 0, outline: diamond, reach: 0.5, yaw: 0, name: "pillar" };
+        const cart = { x: 4, y: 3, outline: around(0.5, 0.5), reach: 0.71, yaw: 0, name: "cart" };
         const fleet = { scene: { solids: [box, pillar], walls: [] }, obstacles: [cart] };
         return [[1, 1.9], [1.9, 1], [4.2, 0.2], [4.3, 0.3], [4.4, 2.6]].map(
           ([x, y]) => solidAt(fleet, x, y)?.name ?? null);
