@@ -183,7 +183,7 @@ class HostileMessages(FlightCase):
         for robot in result["robots"]:
             self.assertTrue(all(goal["reached"] for goal in robot["goals"]), robot)
             self.assertLess(robot["path_length_m"], 1.5 * robot["straight_length_m"])
-        # A hostile goal of robot 0 that is aborted just after the sequencer's can cost it an attempt.
+        # A hostile goal that is aborted just after the sequencer's can cost robot 0 an attempt.
         attempts = [goal["attempts"] for goal in result["robots"][1]["goals"]]
         self.assertEqual(set(attempts), {1})
         self.assertEqual(self.resent(), [])
