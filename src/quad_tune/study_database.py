@@ -120,6 +120,8 @@ def flights_of(database: sqlite3.Connection) -> Tuple[Dict[Key, FlightResult], L
     faults: List[str] = []
     for row, parameters, mission, seed, result in database.execute(_SELECT):
         try:
+            if not isinstance(seed, int):  # SQLite keeps a text in a column of numbers
+                raise ValueError(f"seed is {type(seed).__name__}, expected a whole number")
             flights[parameters, mission, seed] = FlightResult.from_json(result)
         except ValueError as error:
             faults.append(f"row {row} of flights: {error}")

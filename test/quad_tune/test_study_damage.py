@@ -42,6 +42,8 @@ IN_FLIGHTS = {
     "a deep list": ROW.format(f"result = '{'[' * 40000}'"),
     "a blob": ROW.format("result = x'ff00'"),
     "a number as result": ROW.format("result = 5"),
+    "a text as seed": ROW.format("seed = 'first'"),
+    "a view": "CREATE VIEW endless AS SELECT * FROM flights",
     "a field too few": "UPDATE flights SET result = json_remove(result, '$.goals') WHERE rowid = 2",
     "a field too many": result(extra=1),
     "a text as time": result(time_s="'long'"),
