@@ -72,10 +72,14 @@ class ScanIntake:
     def __init__(self, sinks: Sequence[Sink], filters: ScanFilters, local_frame: str) -> None:
         """Hand messages to sinks, in a robot whose local costmap has a global frame."""
         self.sinks = tuple(sinks)
-        self._filters, self._local_frame = filters, local_frame
+        self._filters = filters
         frames = [sink.costmap.params.global_frame for sink in self.sinks]
-        is_local = self._local_frame in frames
-        self._filtered_sink = frames.index(self._local_frame) if is_local else 0
+        self._is_local = local_frame in frames
+        self._filtered_sink = frames.index(local_frame) if self._is_local else 0
+        self._names = [
+            f"{sink.source.topic or sink.source.name} {sink.source.sensor_frame}".strip()
+            for sink in self.sinks
+        ]
         self._keys = [sink.layer.projection_key(sink.source.name) for sink in self.sinks]
         self._buffers = [sink.layer.buffers[sink.source.name] for sink in self.sinks]
         self._expect(sink.source for sink in self.sinks)
@@ -138,17 +142,17 @@ class ScanIntake:
         return ""
 
     def _situation(self, pose: Pose3D, now_s: float) -> ScanSituation:
-        sink = self.sinks[self._filtered_sink]
-        source = sink.source
-        _, low_m, high_m = self._keys[self._filtered_sink]
+        filtered = self._filtered_sink
+        _, low_m, high_m = self._keys[filtered]
+        circles = self.sinks[filtered].layer.excluded_circles
         return ScanSituation(
             now_s,
-            f"{source.topic or source.name} {source.sensor_frame}".strip(),
+            self._names[filtered],
             pose,
-            sink.costmap.params.global_frame == self._local_frame,
+            self._is_local,
             self.expected_period_s,
             (low_m, high_m),
-            sink.layer.excluded_circles,
+            circles,
         )
 
     def add_cloud(

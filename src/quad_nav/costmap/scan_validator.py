@@ -61,7 +61,7 @@ class ScanValidator(ScanFilter):
         reason = sensor.rejection_reason(
             filtered.scan, situation.pose, situation.now_s, situation.expected_period_s
         )
-        return replace(filtered, rejected=reason)
+        return replace(filtered, rejected=reason) if reason else filtered
 
     def reset(self) -> None:
         """Forget earlier scans, after the clock has jumped."""
