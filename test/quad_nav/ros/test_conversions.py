@@ -1,12 +1,16 @@
 """Conversions to messages and back return the input; log messages are escaped."""
 
+import io
 import logging
 import math
+import warnings
 
 import numpy as np
 import pytest
 
 rospy = pytest.importorskip("rospy")
+
+from sensor_msgs.msg import LaserScan  # noqa: E402
 
 from quad_nav.errors import InputError  # noqa: E402
 from quad_nav.geometry import Pose3D, Scan, Twist2D, quaternion_from_euler  # noqa: E402
@@ -52,6 +56,24 @@ def test_scans():
         (12.25, -math.pi, math.pi / 2)
     )
     assert (back.range_min_m, back.range_max_m) == (0.02, 60.0)
+
+
+@pytest.mark.parametrize("kind", ["made", "received"])
+def test_scans_serialise_under_any_numpy(kind):
+    """Without ``ndarray.tostring``: numpy 2.3 lacks it, an older one warns."""
+    ranges = np.array([1.5, math.inf, 0.02], dtype=np.float32)
+    message = conversions.scan_message(Scan(12.25, 0.0, 0.1, 0.02, 60.0, ranges), "Lidar0")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        packed = io.BytesIO()
+        message.serialize(packed)
+        if kind == "received":
+            message = conversions.ScanMessage().deserialize(packed.getvalue())
+            packed = io.BytesIO()
+            message.serialize(packed)
+    plain = LaserScan().deserialize(packed.getvalue())
+    assert (plain.ranges, plain.intensities) == (tuple(ranges.tolist()), ())
+    assert conversions.scan_from_message(message).ranges_m.tolist() == ranges.tolist()
 
 
 def test_intentions():

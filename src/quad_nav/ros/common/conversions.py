@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from typing import List, Mapping, Tuple
 
 import numpy as np
@@ -125,8 +126,21 @@ def odometry_from_message(message: Odometry) -> Tuple[Pose3D, Twist2D]:
     return pose_from_message(message.pose.pose), twist_from_message(message.twist.twist)
 
 
-ScanMessage = numpy_msg(LaserScan)
-"""A LaserScan whose ranges are an array, which rospy serialises without conversion."""
+class _Floats(np.ndarray):
+    """An array with the method that the code of messages calls; numpy 2.3 removed it."""
+
+    def tostring(self) -> bytes:
+        return self.tobytes()
+
+
+class ScanMessage(numpy_msg(LaserScan)):
+    """A LaserScan whose ranges are an array, which rospy serialises without conversion."""
+
+    def serialize(self, buff: BytesIO) -> None:
+        """Write the message."""
+        self.ranges = np.asarray(self.ranges, np.float32).view(_Floats)
+        self.intensities = np.asarray(self.intensities, np.float32).view(_Floats)
+        super().serialize(buff)
 
 
 def scan_message(scan: Scan, frame: str) -> LaserScan:
