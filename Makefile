@@ -27,11 +27,12 @@ fly: workspace  ## Fly the mission: make fly ARGS="config:=tutorial rate:=2"
 test: workspace unit unit38 web lint docs rostest first-hour  ## Run every test and static check
 	@echo "quad: all tests passed"
 
-unit: workspace  ## The unit tests
+# Without ROS the tests of its nodes are left out.
+unit: $(if $(wildcard /usr/bin/catkin_make /opt/ros/noetic),workspace,venv)  ## The unit tests
 	@scripts/make_venv .venv requirements-test.txt requirements-web.txt
 	$(PYTHON) -m pytest -n auto --dist loadfile
 
-unit38: packages  ## A part of the unit tests under Python 3.8, where there is one
+unit38:  ## A part of the unit tests under Python 3.8, where there is one
 	@scripts/unit_tests_38
 
 web: venv  ## The tests of the web page in a real browser: make web TEST=goal
@@ -62,7 +63,8 @@ first-hour: workspace  ## What a user does first: an own scene, map, robot, goal
 	@test/first_hour.sh
 
 # Not in `make test`: Ray is an extra, 70 MB. The cluster is on this machine.
-ray: packages  ## The tests with a Ray cluster, in an environment of their own
+ray:  ## The tests with a Ray cluster, in an environment of their own
+	@scripts/install_packages --venv
 	@scripts/make_venv .venv-ray requirements.txt requirements-tune.txt requirements-test.txt
 	@.venv-ray/bin/python3 -m pip install --quiet '.[ray]'
 	PYTHONPATH=src .venv-ray/bin/python3 -m pytest test/ray
@@ -111,11 +113,12 @@ bench-fleets: venv  ## Whether fleets get through without touching: make bench-f
 packages:  ## Install the system packages
 	@scripts/install_packages $(if $(and $(DISPLAY),$(filter fly,$(MAKECMDGOALS))),--rviz)
 
-venv: packages  ## Make the virtual environment, with the command .venv/bin/quad
+venv:  ## Make the virtual environment, with the command .venv/bin/quad; needs no ROS
+	@scripts/install_packages --venv
 	@scripts/make_venv .venv requirements.txt requirements-tune.txt
 	@scripts/make_command .venv
 
-workspace: venv  ## Build the catkin workspace
+workspace: packages venv  ## Build the catkin workspace
 	@scripts/build_workspace
 
 clean:  ## Remove what was built, but not the virtual environments
