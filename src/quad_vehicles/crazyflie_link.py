@@ -170,7 +170,9 @@ class CrazyflieLink(VehicleLink[Call]):
                 elif name == "stop":
                     crazyflie.commander.send_stop_setpoint()
                 else:
-                    crazyflie.platform.send_arming_request(bool(values[0]))
+                    # The supervisor is in cflib from 0.1.31 on.
+                    arming = getattr(crazyflie, "supervisor", crazyflie.platform)
+                    arming.send_arming_request(bool(values[0]))
         except Exception as error:  # whatever the driver raises: the link is made anew
             self._is_ready = False
             reason = f"cannot send: {error}"

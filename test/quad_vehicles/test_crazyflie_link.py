@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("cflib", reason="the Crazyflie's library needs Python 3.10")
 
-from vehicles.bodies import Bodies  # noqa: E402
+from vehicles.bodies import Bodies, warm_up  # noqa: E402
 from vehicles.crazyflie import AIRFRAME, Crazyflie  # noqa: E402
 from vehicles.crazyflie_server import Server, fly  # noqa: E402
 
@@ -30,6 +30,7 @@ class Desk:
     """A Crazyflie behind a port, and its bridge."""
 
     def __init__(self):
+        warm_up()
         self.bodies = Bodies(airframes=[AIRFRAME])
         self.crazyflie = Crazyflie(self.bodies)
         self.server = Server(0, self.crazyflie)
