@@ -9,7 +9,7 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance replay-vehicles fly-vehicles replay-airframe fuzz bench bench-compare bench-fleets packages venv workspace clean distclean
+.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance replay-vehicles fly-vehicles replay-airframe fuzz bench bench-compare bench-fleets packages flight-venv venv workspace clean distclean
 
 help:  ## List the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -28,7 +28,7 @@ test: workspace unit unit38 web lint docs rostest first-hour  ## Run every test 
 	@echo "quad: all tests passed"
 
 # Without ROS the tests of its nodes are left out.
-unit: $(if $(wildcard /usr/bin/catkin_make /opt/ros/noetic),workspace,venv)  ## The unit tests
+unit: venv $(if $(wildcard /usr/bin/catkin_make /opt/ros/noetic),workspace)  ## The unit tests
 	@scripts/make_venv .venv requirements-test.txt requirements-web.txt
 	$(PYTHON) -m pytest -n auto --dist loadfile
 
@@ -54,12 +54,12 @@ docs: venv  ## The documentation as a site, in site/; warnings are errors
 	@PATH="$(CURDIR)/.venv/bin:$$PATH" NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --quiet --strict
 	@echo "quad: open site/index.html"
 
-rostest: workspace  ## The tests with a roscore: make rostest TEST=environment
+rostest: venv workspace  ## The tests with a roscore: make rostest TEST=environment
 	@$(if $(if $(TEST),$(filter web_browser,$(TEST)),all),scripts/install_packages --browser)
 	@scripts/make_venv .venv requirements-web.txt requirements-web-test.txt requirements-mavlink.txt requirements-crazyflie.txt
 	@scripts/ros_env scripts/rostests $(TEST)
 
-first-hour: workspace  ## What a user does first: an own scene, map, robot, goals and report
+first-hour: venv workspace  ## What a user does first: an own scene, map, robot, goals and report
 	@test/first_hour.sh
 
 # Not in `make test`: Ray is an extra, 70 MB. The cluster is on this machine.
@@ -113,12 +113,16 @@ bench-fleets: venv  ## Whether fleets get through without touching: make bench-f
 packages:  ## Install the system packages
 	@scripts/install_packages $(if $(and $(DISPLAY),$(filter fly,$(MAKECMDGOALS))),--rviz)
 
-venv:  ## Make the virtual environment, with the command .venv/bin/quad; needs no ROS
+# What a flight needs.
+flight-venv:
 	@scripts/install_packages --venv
-	@scripts/make_venv .venv requirements.txt requirements-tune.txt
+	@scripts/make_venv .venv requirements.txt
 	@scripts/make_command .venv
 
-workspace: packages venv  ## Build the catkin workspace
+venv: flight-venv  ## Make the virtual environment, with the command .venv/bin/quad; needs no ROS
+	@scripts/make_venv .venv requirements-tune.txt
+
+workspace: packages flight-venv  ## Build the catkin workspace
 	@scripts/build_workspace
 
 clean:  ## Remove what was built, but not the virtual environments
