@@ -8,6 +8,7 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
+export ROS_HOME=$out/ros_home ROS_LOG_DIR=$out/ros_home/log
 
 quad() {
     echo "+ quad $*"
