@@ -8,6 +8,7 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
+export ROS_HOME=$out/ros_home ROS_LOG_DIR=$out/ros_home/log
 
 quad() {
     echo "+ quad $*"
@@ -48,4 +49,17 @@ quad report "$out/default.bag" "$out/tutorial.bag" -o "$out/comparison.html" --p
 for file in mission.png fleet.html yaws.json default.html comparison.html pictures; do
     [ -s "$out/$file" ] || { echo "quad: $file was not written" >&2; exit 1; }
 done
+
+# A package of your own: a node that imports quad_nav, and a rostest that flies. As the user has it, with
+# the system's Python and without our virtual environment.
+with_ros() {
+    echo "+ $*"
+    env -u PYTHONPATH PATH=/usr/bin:/bin ROS_HOSTNAME=localhost bash -c \
+        'source "$0/setup.bash"; "$@"' "$space" "$@" >"$out/log" 2>&1 ||
+        { local status=$?; cat "$out/log"; return $status; }
+}
+mkdir -p "$out/ws/src"
+cp -r test/own_package "$out/ws/src/my_drones"
+space=.ws/devel with_ros catkin_make --directory "$out/ws"
+space=$out/ws/devel with_ros rostest my_drones mission.test
 echo "quad: the first hour works"

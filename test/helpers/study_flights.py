@@ -210,5 +210,4 @@ def without_flying(
 ) -> None:
     """Let a command fly on paper."""
     monkeypatch.setattr(f"quad_tune.cli.{module}.workers_of", lambda *_: PaperWorkers(fly))
-    monkeypatch.setattr("quad_tune.cli.flights_bar.warm_up", lambda _: None)
-    monkeypatch.setattr("quad_tune.cli.flights_bar.simulate", lambda: None)
+    monkeypatch.setattr("quad_tune.cli.flights_bar.compile_kernels", lambda *_: None)

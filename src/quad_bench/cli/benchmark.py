@@ -11,10 +11,14 @@ from typing import Any, Callable, Generic, Iterator, List, Mapping, Optional, Se
 from quad_nav.cli import EXIT_INTERRUPTED, EXIT_SUCCESS
 from quad_nav.cli.options import echo, echo_lines, raise_on_signals, show_warnings
 from quad_nav.cli.outputs import Outputs
-from quad_nav.cli.progress import FlightPace, flights_progress, processes_text
+from quad_nav.cli.progress import (
+    FlightPace,
+    compile_kernels,
+    flights_progress,
+    processes_text,
+)
 from quad_nav.config import Configuration
 from quad_nav.offline.workers import LocalWorkers
-from quad_nav.scenario.warm_up import simulate, warm_up
 
 R = TypeVar("R")
 
@@ -67,9 +71,9 @@ def run_benchmark(benchmark: Benchmark[R], processes: Optional[int], quiet: bool
     raise_on_signals()
     try:
         with bar:
-            warm_up(benchmark.configuration)  # compile once instead of in every worker
-            simulate()
+            compile_kernels([benchmark.configuration], quiet)  # once instead of in every worker
             bar.start()
+            start_s = time.monotonic()
             for run in benchmark.fly(workers):
                 runs.append(run)
                 bar.show(runs)

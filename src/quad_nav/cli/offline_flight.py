@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import shutil
 import signal
@@ -14,7 +15,7 @@ from quad_nav.cli import EXIT_INTERRUPTED, add_ons
 from quad_nav.cli.options import echo, echo_lines, exit_on_faults, parameter, show_warnings
 from quad_nav.cli.outputs import Outputs
 from quad_nav.cli.pictures import FlightPictures
-from quad_nav.cli.progress import ProgressBar
+from quad_nav.cli.progress import ProgressBar, compile_kernels
 from quad_nav.errors import PluginError
 from quad_nav.files.shipped import shipped
 from quad_nav.loop.worker_process import processes_for
@@ -72,6 +73,7 @@ def fly_mission(
         options = _options(**given)
         setup = read_setup(options)
         page = _page(served) if web else None
+    _compile(setup, quiet)
     while True:
         with exit_on_faults():
             drawn = FlightPictures(setup, outputs)
@@ -87,6 +89,15 @@ def fly_mission(
     if page is not None:
         page.close()
     sys.exit(status)
+
+
+def _compile(setup: FlightSetup, quiet: bool) -> None:
+    """Compile the kernels; a plugin's mistake ends the flight later."""
+    try:
+        with contextlib.suppress(PluginError):
+            compile_kernels(setup.configurations, quiet)
+    except KeyboardInterrupt:
+        sys.exit(EXIT_INTERRUPTED)
 
 
 def _page(options: Mapping[str, Any]) -> FlightPage:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Callable, Optional
+from typing import Callable, Iterable, Optional
 
 from rich.console import Console
 from rich.progress import (
@@ -15,13 +15,45 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
+from quad_nav.cli.options import echo
+from quad_nav.config import Configuration
+from quad_nav.files.kernel_cache import COMPILING, announced
 from quad_nav.mission.actions import Action, GoalEnded
 from quad_nav.offline.flight import Flight, FlightObserver
+from quad_nav.scenario.warm_up import distinct, simulate, warm_up
 
 _PERIOD_S = 0.1  # wall time between two updates
 _SURE_AFTER_S = 10.0
 
-_STARTING = "starting (the first flight after an installation compiles kernels for a minute)"
+
+def compile_kernels(configurations: Iterable[Configuration], quiet: bool) -> None:
+    """Compile the kernels of flights before their clocks start, with a clock of its own.
+
+    Raises:
+        PluginError: A plugin has a mistake.
+    """
+    console = Console(stderr=True)
+    clock = Progress(
+        TextColumn("compiling"),
+        TimeElapsedColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
+    clock.add_task("")
+
+    def announce() -> None:
+        if not quiet:
+            echo(COMPILING, err=True)
+            clock.start()
+
+    try:
+        with announced(announce):
+            simulate()
+            for configuration in distinct(configurations):
+                warm_up(configuration)
+    finally:
+        clock.stop()
 
 
 def flights_progress(quiet: bool) -> Progress:
@@ -141,7 +173,7 @@ class ProgressBar(FlightObserver):
         """Show the bar."""
         self._start_s = time.monotonic()
         goals = sum(len(robot.sequencer.sequence.goals) for robot in flight.robots)
-        self._task = self._progress.add_task("", total=goals, sim=_STARTING)
+        self._task = self._progress.add_task("", total=goals, sim="starting")
         self._progress.start()
         self._progress.refresh()
 

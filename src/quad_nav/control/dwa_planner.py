@@ -87,8 +87,8 @@ class DwaPlanner(PlanFollower):
         return Control(Twist2D(*best.sample), best.cost, best.points, plan)
 
     def cost_cloud(self) -> NDArray[np.float32]:
-        """Return the cells' costs in the last call; empty if it did not search."""
-        if self.best is None or self.critics is None:
+        """Return the cells' costs in the last call; empty if not wanted, or without a search."""
+        if not self.params.publish_cost_grid_pc or self.best is None or self.critics is None:
             return np.zeros((0, 7), dtype=np.float32)
         critics, costs = self.critics, self.critics.costmap.costs
         usable = (critics.grids.path < costs.size) & (costs < INSCRIBED)

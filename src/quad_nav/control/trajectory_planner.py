@@ -80,8 +80,8 @@ class TrajectoryPlanner(PlanFollower):
         return Control(Twist2D(*best.sample), best.cost, best.points, plan)
 
     def cost_cloud(self) -> NDArray[np.float32]:
-        """Return the cells' costs in the last call; empty if it did not simulate."""
-        if self.rollout is None:
+        """Return the cells' costs in the last call; empty if not wanted, or not simulated."""
+        if self.rollout is None or not self.params.publish_cost_grid_pc:
             return np.zeros((0, 7), dtype=np.float32)
         return self.rollout.cost_cloud()
 

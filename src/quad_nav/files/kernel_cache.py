@@ -13,8 +13,10 @@ import functools
 import hashlib
 import os
 import re
+import threading
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Callable, List, Optional, Set, Tuple
+from typing import Any, Callable, Iterator, List, Optional, Set, Tuple
 
 import numba
 
@@ -22,6 +24,11 @@ from quad_nav.files.cache_folder import require_writable, user_cache_folder
 
 COMPILE_S = 60
 """Wall time, about, in which one core compiles the kernels of a flight."""
+COMPILING = (
+    "compiling kernels with numba, once after an installation or a change of the sources: takes "
+    f"about {COMPILE_S} s on one core"
+)
+_LONG_S = 3.0  # loading the cache takes less
 _THIS = Path(__file__).resolve()  # no part of a kernel
 SOURCES = _THIS.parents[2]
 _PACKAGE = SOURCES / "quad_nav"
@@ -110,6 +117,19 @@ def _imported(path: Path) -> List[Path]:
         files = (at.with_suffix(".py"), at / f"{name}.py")
         found += [file for file in files if file.is_file() and file != _THIS]
     return found
+
+
+@contextmanager
+def announced(say: Callable[[], None]) -> Iterator[None]:
+    """Call a function, such as one that prints ``COMPILING``, if the block takes long."""
+    timer = threading.Timer(_LONG_S, say)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()
 
 
 def cache_warnings() -> List[str]:

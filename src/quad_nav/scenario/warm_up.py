@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any, Dict, Tuple
+from typing import Any, Dict, Iterable, List, Tuple
 
 import numpy as np
 
@@ -66,6 +66,19 @@ def warm_up(configuration: config.Configuration) -> None:
     _add_scans(navigator, here)  # again, with the points of a peer to remove
     if isinstance(navigator.controller, TrajectoryPlanner) and navigator.controller.rollout:
         navigator.controller.rollout.score(np.zeros((1, 3)))  # of strafing, the last resort
+
+
+def distinct(configurations: Iterable[config.Configuration]) -> List[config.Configuration]:
+    """Return one configuration for each choice of plugins: the others use the same kernels."""
+    kinds: Dict[Tuple[object, ...], config.Configuration] = {}
+    for one in configurations:
+        layers = tuple(
+            type(layer)
+            for costmap in (one.global_costmap, one.local_costmap)
+            for _, layer in costmap.layers
+        )
+        kinds.setdefault((type(one.global_planner), type(one.local_planner), layers), one)
+    return list(kinds.values())
 
 
 def _filter_scans(filters: ScanFilters, here: Pose2D) -> None:

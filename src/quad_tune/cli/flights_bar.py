@@ -10,9 +10,8 @@ from rich.markup import escape
 
 from quad_nav.cli import EXIT_INTERRUPTED
 from quad_nav.cli.options import echo, raise_on_signals
-from quad_nav.cli.progress import FlightPace, flights_progress
+from quad_nav.cli.progress import FlightPace, compile_kernels, flights_progress
 from quad_nav.errors import printable
-from quad_nav.scenario.warm_up import simulate, warm_up
 from quad_tune.courses import Course
 from quad_tune.evaluation import StudyObserver
 from quad_tune.flight_result import FlightResult
@@ -139,8 +138,7 @@ def run_with_bar(
     raise_on_signals()
     with FlightsBar(command, processes, quiet) as bar:
         try:
-            warm_up(base_configuration(course.config, course.fixed))
-            simulate()
+            compile_kernels([base_configuration(course.config, course.fixed)], quiet)
             bar.start()
             result = run(bar)
         except KeyboardInterrupt:

@@ -213,8 +213,7 @@ def on_paper(tmp_path, monkeypatch):
     """Options of a mission that sweep and tune fly on paper."""
     for command in ("sweep_flights", "tune_study"):
         monkeypatch.setattr(f"quad_tune.cli.{command}.workers_of", lambda *_: PaperWorkers())
-    monkeypatch.setattr("quad_tune.cli.flights_bar.warm_up", lambda _: None)
-    monkeypatch.setattr("quad_tune.cli.flights_bar.simulate", lambda: None)
+    monkeypatch.setattr("quad_tune.cli.flights_bar.compile_kernels", lambda *_: None)
     mission = write_mission(tmp_path / "mission")
     return ("--scene", mission.scene, "--goals", mission.goals, "-q")
 

@@ -100,10 +100,14 @@ def test_the_turn_is_judged_by_the_distances_of_the_last_search():
 def test_cost_cloud_holds_the_cells_a_robot_could_be_in():
     costs = free()
     costs[0, 0], costs[0, 2] = LETHAL, 100
-    planner = planner_at(line(0.0, 0.0, 4.0, 0.0))
-    planner.compute_velocity(WINDOW, costs, ORIGIN, Twist2D(0.3))
+    plan, with_cloud = line(0.0, 0.0, 4.0, 0.0), replace(PARAMS, publish_cost_grid_pc=True)
+    planner, silent = planner_at(plan, with_cloud), planner_at(plan)
+    for each in (planner, silent):
+        each.compute_velocity(WINDOW, costs, ORIGIN, Twist2D(0.3))
 
     cloud = planner.cost_cloud()
+
+    assert len(silent.cost_cloud()) == 0
 
     assert cloud.shape == (3599, 7) and cloud.dtype == np.float32
     # Cell (2, 0) at x = -1.375, y = -1.475: 28 + 30 cells from the plan's beginning, cell

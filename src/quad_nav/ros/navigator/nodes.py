@@ -8,13 +8,13 @@ those of a `move_base` started by `launch/quad.launch`.
 from __future__ import annotations
 
 import sys
-from typing import Callable, Collection, Dict, Iterable, List, Mapping, Tuple
+from typing import Callable, Collection, Dict, List, Mapping
 
 import rospy
 
 from quad_nav.config import Configuration
 from quad_nav.errors import InputError, PluginError, printable
-from quad_nav.files.kernel_cache import cache_warnings
+from quad_nav.files.kernel_cache import COMPILING, announced, cache_warnings
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator.loop import NavigatorLoop
@@ -22,7 +22,7 @@ from quad_nav.ros.navigator.peer_topics import PeerTopics
 from quad_nav.ros.navigator.robot_identity import MAX_ROBOTS, identified
 from quad_nav.ros.navigator.robot_navigator import RobotNavigator
 from quad_nav.scenario.navigator_parameters import load_navigator
-from quad_nav.scenario.warm_up import warm_up
+from quad_nav.scenario.warm_up import distinct, warm_up
 from quad_nav.topics.publishing import Names, in_fleet, own_node
 
 EXIT_FAILURE, EXIT_BAD_INPUT = 1, 2
@@ -144,8 +144,9 @@ def prepare(configurations: Collection[Configuration]) -> None:
     warnings = [line for one in configurations for line in one.warnings]
     for warning in dict.fromkeys((*warnings, *cache_warnings())):
         rospy.logwarn("%s", warning)
-    for configuration in _distinct(configurations):
-        _warm_up(configuration)
+    with announced(lambda: rospy.loginfo("%s", COMPILING)):
+        for configuration in distinct(configurations):
+            _warm_up(configuration)
 
 
 def _warm_up(configuration: Configuration) -> None:
@@ -154,16 +155,3 @@ def _warm_up(configuration: Configuration) -> None:
         warm_up(configuration)
     except PluginError as error:
         rospy.logerr("quad%d: warm-up: %s", configuration.robot, error)
-
-
-def _distinct(configurations: Iterable[Configuration]) -> List[Configuration]:
-    """Return one configuration for each choice of plugins: the others use the same kernels."""
-    kinds: Dict[Tuple[object, ...], Configuration] = {}
-    for one in configurations:
-        layers = tuple(
-            type(layer)
-            for costmap in (one.global_costmap, one.local_costmap)
-            for _, layer in costmap.layers
-        )
-        kinds.setdefault((type(one.global_planner), type(one.local_planner), layers), one)
-    return list(kinds.values())
