@@ -19,7 +19,7 @@ from quad_vehicles.crazyflie_adapter import (
     Call,
     CrazyflieAdapter,
 )
-from quad_vehicles.link import VehicleLink
+from quad_vehicles.link import VehicleLink, not_installed
 from quad_vehicles.states import VehicleMachine
 from quad_vehicles.vehicle_file import Vehicle
 
@@ -54,8 +54,9 @@ class CrazyflieLink(VehicleLink[Call]):
             InputError: If cflib is missing.
         """
         if cflib is None:
-            what = "cflib is missing; install requirements-crazyflie.txt (Python 3.10 or later)"
-            raise InputError([f"{vehicle.name}: {what}"])
+            raise InputError(
+                [not_installed(vehicle, "cflib, for Python 3.10 or later,", "crazyflie")]
+            )
         if not cflib.crtp.CLASSES:
             cflib.crtp.init_drivers()
         self.adapter = CrazyflieAdapter(vehicle, machine)

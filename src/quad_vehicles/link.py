@@ -82,3 +82,12 @@ class VehicleLink(ABC, Generic[Sent]):
     @abstractmethod
     def close(self) -> None:
         """Close the connection."""
+
+
+def not_installed(vehicle: Vehicle, library: str, extra: str) -> str:
+    """Return the fault of a vehicle whose library is missing."""
+    return (
+        f"{vehicle.name}: {library} is not installed; expected it from pip install"
+        f" 'quad-nav[{extra}]', in a checkout from .venv/bin/pip install -r"
+        f" requirements-{extra}.txt"
+    )

@@ -22,7 +22,7 @@ os.environ["MAVLINK20"] = "1"  # pymavlink reads it at its import
 from quad_nav.errors import InputError
 from quad_vehicles.autopilots import AUTOPILOT_COMPONENT
 from quad_vehicles.exchanges import Message
-from quad_vehicles.link import VehicleLink
+from quad_vehicles.link import VehicleLink, not_installed
 from quad_vehicles.mavlink_adapter import MavlinkAdapter
 from quad_vehicles.states import VehicleMachine
 from quad_vehicles.vehicle_file import Vehicle
@@ -126,9 +126,7 @@ class MavlinkLink(VehicleLink[Message]):
             InputError: If pymavlink is missing, or the address cannot be opened.
         """
         if mavutil is None:
-            raise InputError(
-                [f"{vehicle.name}: pymavlink is missing; install requirements-mavlink.txt"]
-            )
+            raise InputError([not_installed(vehicle, "pymavlink", "mavlink")])
         self.adapter = MavlinkAdapter(vehicle, machine)
         super().__init__(vehicle, self.adapter, clock)
         self._empty, self._reopen_s = 0, 0.0

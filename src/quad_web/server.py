@@ -213,8 +213,8 @@ def require_nicegui() -> None:
     if importlib.util.find_spec("nicegui") is None:
         raise InputError(
             [
-                "web: NiceGUI is not installed; install it with pip install 'quad-nav[web]', in a"
-                " checkout with .venv/bin/pip install '.[web]'"
+                "web: NiceGUI is not installed; expected it from pip install 'quad-nav[web]', in a"
+                " checkout from .venv/bin/pip install -r requirements-web.txt"
             ]
         )
 

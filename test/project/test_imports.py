@@ -38,7 +38,10 @@ LAYERS = [
 # Navigation and the simulator do not import each other.
 WORLD_USERS = set("sim mission scenario topics loop offline recording report cli ros api".split())
 # (importing module, imported add-on): an add-on imports another one in these modules alone.
-BETWEEN_ADD_ONS = {("quad_tune/barn_course.py", "quad_bench")}
+BETWEEN_ADD_ONS = {
+    ("quad_tune/barn_course.py", "quad_bench"),
+    ("quad_tune/test_barn_course.py", "quad_bench"),
+}
 
 ROS = ("quad_nav/ros/", "quad_vehicles/ros/", "quad_web/ros/")
 # The files or folders in which a third-party package may be imported.
@@ -75,6 +78,7 @@ PLACES = {
     "cflib": "quad_vehicles/crazyflie_link.py",
     "PIL": ("quad_nav/sim/map_image.py", "quad_nav/report/", "quad_bench/circle/picture.py"),
 }
+TESTS = SOURCES.parent / "test"
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join([str(SOURCES), *sys.path])}
 MESSAGE_SUFFIXES = ("_msgs", "_srvs")
 
@@ -163,6 +167,23 @@ def test_rules_refuse(module, statement):
 def test_rules_allow(module, statement):
     path = SOURCES / module
     assert forbidden_imports(path, imported_names(statement, package_of(path))) == []
+
+
+def test_tests_of_a_package_need_no_add_on_but_their_own():
+    homes = {path.stem: folder_of(path) for path in TESTS.rglob("*.py")}
+    found = []
+    for path in [*TESTS.glob("quad_*/**/*.py"), *TESTS.glob("helpers/*.py")]:
+        for name in imported_names(path.read_text(), []):
+            first = name.partition(".")[0]
+            owner, user = homes.get(first, first), path.relative_to(TESTS).as_posix()
+            own_or_core = owner == folder_of(path) or owner not in ADD_ONS
+            if not own_or_core and (user, owner) not in BETWEEN_ADD_ONS:
+                found.append(f"{user}: {name}")
+    assert found == []
+
+
+def folder_of(path: Path) -> str:
+    return path.relative_to(TESTS).parts[0]
 
 
 def test_no_module_imports_itself_through_others():

@@ -11,7 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from test_limits import missing_numbers
+from test_outputs import assert_output_is_checked_first
+from test_terminal import NAME, quad
+from test_user_files import assert_reads_files_alone
 
+from quad_bench.barn import arrays
 from quad_bench.barn.protocol import Outcome, Run, metric
 from quad_bench.barn.results import Results
 from quad_bench.barn.runs import fly_all, fly_world, judge
@@ -305,3 +310,12 @@ def test_without_a_flight_there_are_no_statistics(tmp_path):
     assert Results(setup.contestant, (), 1, 0.0).rows == []
     with pytest.raises(ValueError, match="no runs"):
         barn_statistics([])
+
+
+def test_what_is_read_and_written_is_checked_as_everywhere(tmp_path):
+    assert missing_numbers("BARN worlds (`.npz`)", [arrays.MAX_BYTES]) == []
+    assert_reads_files_alone(load_worlds, tmp_path / "w.npz")
+    quad("barn", "--worlds", tmp_path / NAME)
+    quad("barn", "--worlds", "x.npz", "--only", NAME)
+    (tmp_path / "empty").mkdir()
+    assert_output_is_checked_first(tmp_path / "empty", "barn --worlds w.npz", "--csv", "x.csv")

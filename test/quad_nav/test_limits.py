@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from quad_bench.barn import arrays
 from quad_nav import errors
 from quad_nav.config import workload
 from quad_nav.costmap.layered import CostmapParams
@@ -56,7 +55,6 @@ ROWS = {
     "image of a map": [map_image.MAX_BYTES, map_image.MAX_CELLS, values.MAX_MEMORY_BYTES // 10**9],
     "cells of a map": [map_file.MIN_RESOLUTION_M, map_file.MAX_RESOLUTION_M, map_file.MAX_BOXES],
     "costmap": [values.MAX_MEMORY_BYTES // 10**9, workload.MAX_POINTS],
-    "BARN worlds (`.npz`)": [arrays.MAX_BYTES],
     "recording that is read": [
         bag_trace.MAX_MEMORY_BYTES / 1e9,
         bag_trace.LONGEST_FLIGHT_S / 86400,
@@ -74,12 +72,16 @@ def spellings(number):
     return {str(number), f"{number:g}", f"{number:g}".replace("e+0", "e"), f"{number:.0f}"}
 
 
-@pytest.mark.parametrize("row", ROWS)
-def test_the_table_has_the_limits_in_force(row):
+def missing_numbers(row, numbers):
+    """The numbers that the row of the table does not have."""
     (line,) = [line for line in TABLE.splitlines() if line.startswith(f"| {row} |")]
     words = set(line.replace(",", " ").replace(";", " ").split())
-    for number in ROWS[row]:
-        assert spellings(number) & words, number
+    return [number for number in numbers if not spellings(number) & words]
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_the_table_has_the_limits_in_force(row):
+    assert missing_numbers(row, ROWS[row]) == []
 
 
 def costmap(side_m, *layers, **fields):

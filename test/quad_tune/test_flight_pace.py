@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 from click.testing import CliRunner
-from study_flights import FLOWN, PaperWorkers, tune_setup, without_flying, write_mission
+from small_mission import write_mission
+from study_flights import FLOWN, PaperWorkers, tune_setup, without_flying
 
 from quad_nav.cli.progress import FlightPace, duration_text, processes_text
 from quad_tune.cli.flights_bar import FlightsBar

@@ -14,7 +14,8 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from study_flights import SYNTHETIC_SPACE, write_mission
+from small_mission import write_mission
+from study_flights import SYNTHETIC_SPACE
 from test_tuning_search import IDENTITY, run
 
 from quad_nav.errors import InputError

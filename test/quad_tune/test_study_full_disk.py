@@ -7,6 +7,7 @@ from contextlib import closing
 
 import pytest
 from click.testing import CliRunner
+from small_mission import write_mission
 from study_flights import (
     FLOWN,
     SPACE,
@@ -14,8 +15,8 @@ from study_flights import (
     trials_as_data,
     tune_setup,
     without_flying,
-    write_mission,
 )
+from test_outputs import FULL, assert_output_is_checked_first, full_disk, run  # noqa: F401
 
 from quad_nav.errors import InputError
 from quad_tune.cli.sweep import sweep
@@ -135,3 +136,40 @@ def test_a_flight_that_cannot_be_stored_stays_in_memory(tmp_path, monkeypatch):
     assert (cache[key], cache.is_broken) == (FLOWN, True)
     with pytest.raises(InputError, match="that can be written"):
         FlightCache(tmp_path / "nowhere" / "f.db")
+
+
+@pytest.mark.parametrize(
+    "command, option",
+    [("sweep --over TrajectoryPlannerROS/max_vel_x=0.3", "--pictures"), ("tune", "--output")],
+)
+def test_every_output_is_checked_first(tmp_path, command, option):
+    assert_output_is_checked_first(tmp_path, command, option, "x")
+
+
+def test_a_sweep_prints_what_it_cannot_write(tmp_path, monkeypatch, full_disk):  # noqa: F811
+    without_flying(monkeypatch, "sweep_flights")
+    mission = write_mission(tmp_path / "mission")
+    over = ("--over", "TrajectoryPlannerROS/max_vel_x=0.3,0.4", "--flights", "2")
+    files = [("--json", "x.json"), ("--csv", "x.csv"), ("--report", "x.html"), ("--pictures", "x")]
+    given = [word for option, name in files for word in (option, tmp_path / name)]
+    done = run("sweep", "--scene", mission.scene, "--goals", mission.goals, "-q", *over, *given)
+    assert done.exit_code == 1
+    for option, name in files:
+        assert f"{option}: {tmp_path / name}: cannot be written: {FULL}; " in done.output
+    assert '"figures": {' in done.output
+    assert "TrajectoryPlannerROS/max_vel_x,flights," in done.output
+    assert [path for path in tmp_path.rglob("*") if path.suffix in (".partial", ".html")] == []
+
+
+def test_a_study_prints_what_it_cannot_write(tmp_path, monkeypatch, full_disk):  # noqa: F811
+    without_flying(monkeypatch, "tune_study")
+    out = tmp_path / "out"
+    few = ["--candidates", "--flights", "--finalists", "--final-flights", "--held-out"]
+    counts = [word for option in few for word in (option, "1")]
+    done = run("tune", *tune_command(tmp_path), "-q", *counts)
+    assert done.exit_code == 1, done.output
+    line, *overview = done.output.splitlines()
+    assert line == f"--output: {out}: cannot be written: {FULL}; printing the result instead"
+    assert len(overview) > 5
+    written = [path.name for path in out.iterdir()]
+    assert [name for name in written if not name.startswith(("study.", ".", "lock"))] == []

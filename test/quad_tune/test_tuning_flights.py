@@ -10,9 +10,9 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
+from small_mission import write_mission
 from study_flights import (
     FAST,
     SPACE,
@@ -20,17 +20,12 @@ from study_flights import (
     mortal_tasks,
     searched,
     tune_setup,
-    write_mission,
 )
 from test_report_page import assert_loads_nothing
 
-from quad_bench.barn.protocol import Outcome
-from quad_bench.barn.runs import fly_world
-from quad_bench.barn.setup import BarnOptions, read_barn_setup
 from quad_nav import config
 from quad_nav.errors import InputError
 from quad_nav.offline.workers import MAX_DEATHS, LocalWorkers, WorkersLost, fly_all
-from quad_tune.barn_course import BarnCourse
 from quad_tune.cli.sweep import sweep
 from quad_tune.cli.tune import tune
 from quad_tune.courses import HELD_OUT_SEED, Case, Mission, MissionCourse, check_missions
@@ -65,7 +60,7 @@ def test_workers_that_die_again_and_again_end_it(tmp_path):
 
 
 def test_what_is_held_out_is_never_searched(tmp_path):
-    mission = write_mission(tmp_path)
+    mission = Mission(*write_mission(tmp_path))
     options = replace(
         mission_options(tmp_path), missions=(mission, Mission()), robots=1, parameters=()
     )
@@ -83,7 +78,7 @@ def test_what_is_held_out_is_never_searched(tmp_path):
     scenes = [course.setup(case, ()).scene for case in (searched_cases[1], held_out[1])]
     assert scenes[0].obstacles != scenes[1].obstacles
 
-    other = write_mission(tmp_path / "other")
+    other = Mission(*write_mission(tmp_path / "other"))
     named = MissionCourse(replace(options, held_out=(other,)))
     assert {case.name for case in named.held_out_cases(5)} == {other.name}
     with pytest.raises(InputError, match="is also a mission of the search"):
@@ -121,47 +116,6 @@ def test_the_lidar_can_be_another_one(tmp_path):
     assert (lidar.range_max_m, lidar.beam_count) == (3.0, 90)
     assert "lidar/rnge: unknown" in task_of(course, case, (("lidar/rnge", 3),)).refused
     assert "expected more than 0" in task_of(course, case, (("lidar/beams", 0),)).refused
-
-
-def barn_worlds(folder: Path) -> Path:
-    """Twelve empty worlds; 0 and 6 are of the official sample."""
-    numbers = np.arange(12, dtype=np.int32)
-    way = np.array([[-2.25, 5.0], [-2.25, 9.0]], np.float32)
-    np.savez(
-        folder / "worlds.npz",
-        index=numbers,
-        occupied=np.zeros((12, 64, 30), np.uint8),
-        **{f"path_{number}": way for number in numbers},
-    )
-    return folder / "worlds.npz"
-
-
-def test_barn_is_searched_outside_of_the_official_sample(tmp_path):
-    course = BarnCourse(BarnOptions(barn_worlds(tmp_path)))
-    searched_worlds = [case.name for case in course.search_cases(10)]
-    held_out = [case.name for case in course.held_out_cases(3)]
-    numbers = sorted(int(name.split()[-1]) for name in searched_worlds)
-    assert numbers == [1, 2, 3, 4, 5, 7, 8, 9, 10, 11]
-    assert held_out == ["BARN world 0", "BARN world 6", "BARN world 0"]
-    assert {int(name.split()[-1]) > 5 for name in searched_worlds[:2]} == {True, False}
-    assert {case.seed for case in course.held_out_cases(3)} == {HELD_OUT_SEED, HELD_OUT_SEED + 1}
-
-
-def test_a_flight_through_barn_counts_as_the_benchmark_counts_it(tmp_path):
-    path = barn_worlds(tmp_path)
-    course = BarnCourse(BarnOptions(path))
-    cases = [Case(0, "BARN world 0", 0)]
-    flight = fly_task(task_of(course, cases[0], ()))
-    setup = read_barn_setup(BarnOptions(path, only=(0,)))
-    run = fly_world(setup.contestant, setup.worlds[0], 0)
-    assert run.outcome is Outcome.SUCCESS
-    found = course.protocol_statistics(cases, [flight]).data
-    assert found["successes"] == 1
-    assert (found["mean_time_s"], found["metric"]) == (run.time_s, run.metric)
-    touched = course.protocol_statistics(cases, [replace(flight, contacts=1)]).data
-    late = course.protocol_statistics(cases, [replace(flight, reached=0)]).data
-    assert (touched["collisions"], late["time_outs"]) == (1, 1)
-    assert touched["metric"] == late["metric"] == 0.0
 
 
 def files_of(folder):
@@ -218,8 +172,6 @@ def test_tune_from_the_command_line_and_again(tmp_path):
             ["--config", "nowhere"],
             "or the name of a shipped one",
         ),
-        (["--worlds", "none.npz"], "none.npz"),
-        (["--worlds", "none.npz", "--robots", "2"], "cannot be combined with"),
         (["--scene", "a.yaml", "--scene", "b.yaml", "--goals", "g"], "a folder of goals for each"),
         (["--space", "none.yaml"], "none.yaml: cannot be read"),
     ],

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from study_flights import FLOWN, PaperWorkers, tune_setup, without_flying, write_mission
+from small_mission import write_mission
+from study_flights import FLOWN, PaperWorkers, tune_setup, without_flying
 
 from quad_nav import config
 from quad_nav.control.dwa_planner_params import DwaParams

@@ -138,4 +138,4 @@ def test_a_flight_without_cflib_says_what_to_install(monkeypatch):
     machine = VehicleMachine(1.0, Limits(), TRAITS, Permissions())
     with pytest.raises(crazyflie_link.InputError) as error:
         crazyflie_link.CrazyflieLink(vehicle, machine, time.monotonic)
-    assert "install requirements-crazyflie.txt" in str(error.value)
+    assert "pip install 'quad-nav[crazyflie]'" in str(error.value)

@@ -7,12 +7,26 @@ import threading
 
 import numpy as np
 import pytest
+from test_current_folder import mission, run_script  # noqa: F401
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
 from quad_web.process import Batch, Call, Channel, ServedSource, require_nicegui
 from quad_web.view.actions import Answer
 from quad_web.view.state import Item, Wanted
+
+PAGE = """
+from quad_nav.errors import InputError
+from quad_web import process
+from quad_web.server import WebOptions
+
+process.require_nicegui = lambda: None
+if __name__ == "__main__":
+    try:
+        process.ServerProcess(WebOptions(), frozenset()).close()
+    except InputError as error:
+        print(error)
+"""
 
 
 def received(channel: Channel, count: int) -> list:
@@ -88,3 +102,7 @@ def test_without_nicegui_the_message_says_how_to_install_it(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"NiceGUI is not installed; .* 'quad-nav\[web\]'"):
         require_nicegui()
+
+
+def test_files_of_the_current_folder_are_not_run(mission):  # noqa: F811
+    run_script(mission, PAGE)

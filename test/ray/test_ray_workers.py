@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Iterator
 
 import pytest
 import ray
 from ray.cluster_utils import Cluster
+from study_flights import mortal_tasks, searched, tune_setup
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "unit"))
-
-from study_flights import mortal_tasks, searched, tune_setup  # noqa: E402
-
-from quad_nav.errors import InputError  # noqa: E402
-from quad_nav.offline.workers import LocalWorkers, RayWorkers, fly_all  # noqa: E402
-from quad_tune.flight_result import fly_task  # noqa: E402
+from quad_nav.errors import InputError
+from quad_nav.offline.workers import LocalWorkers, RayWorkers, fly_all
+from quad_tune.flight_result import fly_task
 
 
 @pytest.fixture(scope="module")

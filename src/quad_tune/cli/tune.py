@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from quad_nav.cli import add_ons
 from quad_nav.cli.options import A_FILE, A_FOLDER, COUNT
 from quad_tune.cli.study_options import flown_options, worker_options
 
@@ -113,6 +114,4 @@ def tune(**given: Any) -> None:
     130 after Ctrl-C.
     """
     # Imported here: the engine loads slowly, and --help does not need it.
-    from quad_tune.cli.tune_study import run_study
-
-    run_study(**given)
+    add_ons.load("quad_tune.cli.tune_study", "quad tune").run_study(**given)

@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 from size_limit import size_limit
-from study_flights import FLOWN, SPACE, write_mission
 
 from quad_nav.cli import main
 from quad_nav.files import output
@@ -131,16 +130,17 @@ def test_whatever_fails_leaves_the_older_file_and_nothing_else(tmp_path, error):
         ("fly", "--report", "x.html"),
         ("fly", "--animate", "x.gif"),
         ("fly", "--record", "x.bag"),
-        ("barn --worlds w.npz", "--csv", "x.csv"),
-        ("sweep --over TrajectoryPlannerROS/max_vel_x=0.3", "--pictures", "x"),
-        ("tune", "--output", "x"),
         ("report flight.bag", "--output", "x.html"),
         ("report flight.bag", "--pictures", "x"),
         ("report flight.bag", "--animate", "x.gif"),
     ],
 )
 def test_every_output_is_checked_first(tmp_path, command, option, name):
-    """Nothing is read, flown or written before; the worlds and the bag do not even exist."""
+    assert_output_is_checked_first(tmp_path, command, option, name)
+
+
+def assert_output_is_checked_first(tmp_path, command, option, name):
+    """Nothing is read, flown or written before; the bag does not even exist."""
     (tmp_path / "file").write_text("")
     places = {
         Path("/quad-nav-test-misspelled"): "there is no folder /quad-nav-test-misspelled",
@@ -195,53 +195,6 @@ def test_a_quiet_flight_tells_that_its_recording_failed(tmp_path):
         "cannot write the recording: no room for a single chunk\n",
     )
     assert names(tmp_path) == []
-
-
-class PaperWorkers:
-    """Returns the same result for each flight, without flying."""
-
-    count = 1
-
-    def run(self, function, tasks):
-        """Yield each task's number and the result."""
-        for number, _ in tasks:
-            yield number, FLOWN
-
-
-@pytest.fixture
-def on_paper(tmp_path, monkeypatch):
-    """Options of a mission that sweep and tune fly on paper."""
-    for command in ("sweep_flights", "tune_study"):
-        monkeypatch.setattr(f"quad_tune.cli.{command}.workers_of", lambda *_: PaperWorkers())
-    monkeypatch.setattr("quad_tune.cli.flights_bar.compile_kernels", lambda *_: None)
-    mission = write_mission(tmp_path / "mission")
-    return ("--scene", mission.scene, "--goals", mission.goals, "-q")
-
-
-def test_a_sweep_prints_what_it_cannot_write(tmp_path, on_paper, full_disk):
-    over = ("--over", "TrajectoryPlannerROS/max_vel_x=0.3,0.4", "--flights", "2")
-    files = [("--json", "x.json"), ("--csv", "x.csv"), ("--report", "x.html"), ("--pictures", "x")]
-    given = [word for option, name in files for word in (option, tmp_path / name)]
-    done = run("sweep", *on_paper, *over, *given)
-    assert done.exit_code == 1
-    for option, name in files:
-        assert f"{option}: {tmp_path / name}: cannot be written: {FULL}; " in done.output
-    assert '"figures": {' in done.output
-    assert "TrajectoryPlannerROS/max_vel_x,flights," in done.output
-    assert [path for path in tmp_path.rglob("*") if path.suffix in (".partial", ".html")] == []
-
-
-def test_a_study_prints_what_it_cannot_write(tmp_path, on_paper, full_disk):
-    (tmp_path / "space.yaml").write_text(SPACE)
-    few = ["--candidates", "--flights", "--finalists", "--final-flights", "--held-out"]
-    counts = [word for option in few for word in (option, "1")]
-    out = tmp_path / "out"
-    done = run("tune", *on_paper, *counts, "--space", tmp_path / "space.yaml", "--output", out)
-    assert done.exit_code == 1, done.output
-    line, *overview = done.output.splitlines()
-    assert line == f"--output: {out}: cannot be written: {FULL}; printing the result instead"
-    assert len(overview) > 5
-    assert [name for name in names(out) if not name.startswith(("study.", ".", "lock"))] == []
 
 
 def test_standard_output_on_a_full_disk_is_told():

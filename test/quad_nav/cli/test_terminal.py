@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from PIL import Image
-from study_flights import FLOWN, SCENE, SPACE, write_mission
+from small_mission import SCENE, write_mission
 
 from quad_nav.cli import main
 from quad_nav.errors import printable
@@ -22,7 +22,6 @@ from quad_nav.mission.goal import Goal
 from quad_nav.mission.summary import MissionSummary, RobotSummary
 from quad_nav.mission.summary_table import table
 from quad_nav.sim.contacts import Contact
-from quad_tune.flight_cache import FlightCache
 
 EVIL = "\x1b]0;owned\x07\x1b[2J\x9b31m\r\x08\x7f\u202ecod\u2066\u200e\nforged: all goals reached"
 NAME = EVIL.replace("/", "")
@@ -83,7 +82,7 @@ def test_parameters(folder, mission, how):
         assert_harmless(done.output)
 
 
-def test_names_of_files_and_folders(tmp_path, mission):
+def test_names_of_files_and_folders(tmp_path):
     named = tmp_path / NAME
     quad("check", named)
     quad("fly", "--scene", named)
@@ -91,17 +90,9 @@ def test_names_of_files_and_folders(tmp_path, mission):
     quad("fly", "--config", named)
     quad("fly", "--record", named)
     quad("report", named)
-    quad("tune", "--space", named, "--output", tmp_path / "out")
-    quad("tune", "--against", NAME, "--output", tmp_path / "out")
-    quad("sweep", "--points", named)
-    quad("barn", "--worlds", named)
     named.mkdir()
     (named / "costmap_common_params.yaml").write_text("local_costmap: {width: 3.0}\n")
     quad("check", named, status=0)
-    (named / "other.yaml").write_text("[]")
-    files = ["--scene", mission.scene, "--goals", mission.goals]
-    over = ["--over", "TrajectoryPlannerROS/max_vel_x=0.4"]
-    quad("sweep", *files, *over, "--cache", named / "nowhere" / "f.db")
 
 
 def test_arguments(tmp_path):
@@ -113,9 +104,6 @@ def test_arguments(tmp_path):
         ["fly", "--seed", NAME],
         ["fly", "--set", NAME],
         ["fly", "--set", f"global_costmap/width=[{NAME}"],
-        ["sweep", "--over", NAME],
-        ["sweep", "--over", f"TrajectoryPlannerROS/{NAME}=1,2"],
-        ["barn", "--worlds", "x.npz", "--only", NAME],
     ):
         quad(*arguments)
 
@@ -178,22 +166,6 @@ def test_maps(mission, tmp_path, line):
     (tmp_path / "m.yaml").write_text(f"{line}\n{usual}")
     shown = line != f"{QUOTED}: 1"  # the faults of the other keys are first
     quad("fly", "--scene", tmp_path / "m.yaml", "--goals", mission.goals, shown=shown)
-
-
-def test_studies(tmp_path, mission):
-    files = ["--scene", mission.scene, "--goals", mission.goals]
-    (tmp_path / "space.yaml").write_text(f"{SPACE}{QUOTED}: {{range: [0, 1]}}\n")
-    quad("tune", *files, "--space", tmp_path / "space.yaml", "--output", tmp_path / "out")
-    (tmp_path / "p.csv").write_text(f'TrajectoryPlannerROS/max_vel_x,"{EVIL}"\n0.3,1\n')
-    quad("sweep", *files, "--points", tmp_path / "p.csv")
-    (tmp_path / "p.csv").write_text(f'TrajectoryPlannerROS/max_vel_x\n"{EVIL}"\n')
-    quad("sweep", *files, "--points", tmp_path / "p.csv", shown=False)
-    cache = FlightCache(tmp_path / "f.db")
-    cache.add(("{}", "m", 0), replace(FLOWN, reached=7, goals=2, reason=EVIL))
-    over = ["--over", "TrajectoryPlannerROS/max_vel_x=0.4", "--cache", tmp_path / "f.db"]
-    quad("sweep", *files, *over, shown=False)
-    (tmp_path / "f.db").write_text(f"{EVIL}" * 50)
-    quad("sweep", *files, *over, shown=False)
 
 
 @pytest.mark.parametrize("name", ["a.bag", f"{NAME}.bag", "a.txt"])

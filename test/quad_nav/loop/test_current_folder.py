@@ -54,18 +54,6 @@ if __name__ == "__main__":
     loop.close()
     print(Path("folder").read_text())
 """
-PAGE = """
-from quad_nav.errors import InputError
-from quad_web import process
-from quad_web.server import WebOptions
-
-process.require_nicegui = lambda: None
-if __name__ == "__main__":
-    try:
-        process.ServerProcess(WebOptions(), frozenset()).close()
-    except InputError as error:
-        print(error)
-"""
 
 
 @pytest.fixture
@@ -105,10 +93,6 @@ def test_workers_of_a_study(mission):
 def test_navigators_in_other_processes(mission):
     text = NAVIGATORS.format(goals=str(ROOT / "goals"))
     assert run_script(mission, text) == f"{mission}\n"
-
-
-def test_server_of_the_page(mission):
-    run_script(mission, PAGE)
 
 
 def test_parameters_for_roslaunch(mission):

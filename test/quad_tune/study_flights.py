@@ -1,4 +1,4 @@
-"""A small mission for studies: one quadcopter, 3 m past a pillar, a second of computing."""
+"""Studies of the small mission, and flights on paper."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterable, Iterator, List, Sequence, Tuple
+
+from small_mission import write_mission
 
 from quad_nav.errors import InputError
 from quad_nav.offline.workers import Workers
@@ -19,15 +21,6 @@ from quad_tune.space import Assignments, Dimension, SearchSpace
 from quad_tune.study import open_study
 from quad_tune.tune import TuneOptions, TuneSetup, read_tune_setup, start_values
 
-SCENE = """\
-name: small
-size: [5.0, 4.0]
-altitude: 1.0
-obstacles:
-  - {name: pillar, shape: cylinder, centre: [2.5, 1.7], radius: 0.2, height: 2.0}
-starts:
-  - [1.0, 2.0, 0.0]
-"""
 SPACE = """\
 TrajectoryPlannerROS/max_vel_x: {range: [0.3, 0.8]}
 TrajectoryPlannerROS/vx_samples: {range: [3, 8], integer: true}
@@ -51,18 +44,9 @@ FLOWN = FlightResult(
 )
 
 
-def write_mission(folder: Path) -> Mission:
-    """The mission's files."""
-    goals = folder / "goals"
-    goals.mkdir(parents=True, exist_ok=True)
-    (goals / "quad0_goals.json").write_text(json.dumps({"goals": [[4.0, 2.0]]}))
-    (folder / "scene.yaml").write_text(SCENE)
-    return Mission(folder / "scene.yaml", goals)
-
-
 def mission_options(folder: Path, **given: Any) -> MissionOptions:
     """Whose flights take a fifth of what those with all samples do."""
-    return MissionOptions((write_mission(folder),), parameters=FAST, **given)
+    return MissionOptions((Mission(*write_mission(folder)),), parameters=FAST, **given)
 
 
 def tune_setup(
