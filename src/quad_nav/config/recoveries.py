@@ -84,6 +84,18 @@ def recoveries(
     return tuple((name, with_fixes(_params(name, kind, tree), tree)) for name, kind in sequence)
 
 
+def with_local_planner(
+    named: Tuple[Tuple[str, RecoveryParams], ...], tree: Mapping[str, Any]
+) -> Tuple[Tuple[str, RecoveryParams], ...]:
+    """Return (name, parameters) of recoveries that slow down the local planner of a tree."""
+    return tuple(
+        (name, with_fixes(_params(name, MOVE_SLOW, tree), tree))
+        if isinstance(params, MoveSlowAndClearParams)
+        else (name, params)
+        for name, params in named
+    )
+
+
 def circumscribed_radius_m(tree: Mapping[str, Any]) -> float:
     """Return move_base's circumscribed radius: its own parameter, not the footprint's."""
     costmap = tree["local_costmap"]
