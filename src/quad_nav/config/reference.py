@@ -71,8 +71,8 @@ warnings without flying.
   `quad/VoronoiCell`. Parameters of other filters are below the filter's name: see
   [plugins](plugins.md#command-filter) and [moving obstacles](moving_obstacles.md).
 * Layers of other packages are skipped. Planners of other packages, and a list with recoveries of
-  other packages, are replaced by the defaults. Planners, layers and recoveries of your own are named
-  as Python classes: see [plugins](plugins.md).
+  other packages, are replaced by the defaults. Planners, layers and recoveries of your own are
+  named as Python classes: see [plugins](plugins.md).
 * Only the namespaces of the chosen planners are read. `rotate_recovery` reads its limits from
   `TrajectoryPlannerROS` whatever the local planner.
 """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from typing import Callable
+from typing import Callable, List
 
 import rospy
 from nav_msgs.srv import GetPlan, GetPlanRequest, GetPlanResponse
@@ -37,12 +37,23 @@ class PlanServices:
         """Advertise the services; ``lock`` guards the navigator."""
         self._host, self._navigator = host, host.navigator
         self._topics, self._lock, self._locate = topics, lock, locate
-        planner = plugin_name(host.navigator.params.base_global_planner)
+        self._names = names
         self._services = [
             rospy.Service(names("~make_plan"), GetPlan, self._make_plan),
-            rospy.Service(names(f"~{planner}/make_plan"), GetPlan, self._make_planner_plan),
             rospy.Service(names("~clear_costmaps"), Empty, self._clear_costmaps),
         ]
+        self._of_planner: List[rospy.Service] = []
+        self.change_planner()
+
+    def change_planner(self) -> None:
+        """Advertise the service of the global planner in use, and that of no other one."""
+        planner = plugin_name(self._navigator.params.base_global_planner)
+        name = rospy.resolve_name(self._names(f"~{planner}/make_plan"))
+        if [one.resolved_name for one in self._of_planner] == [name]:
+            return
+        for service in self._of_planner:
+            service.shutdown()
+        self._of_planner = [rospy.Service(name, GetPlan, self._make_planner_plan)]
 
     def _make_plan(self, request: GetPlanRequest) -> GetPlanResponse:
         with self._lock:
