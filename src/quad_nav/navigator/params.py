@@ -26,6 +26,9 @@ class NavigatorParams:
             restores upstream behaviour, which commands one control period later.
         stop_while_planning: A robot without a plan stops; False restores upstream behaviour,
             which leaves the last command in force.
+        check_plan_requests: ``make_plan`` checks the poses and the tolerance of a request, takes
+            frames with a slash, and says why it refuses while a goal is active; False restores
+            upstream behaviour.
         progress: Detection of a robot that makes no progress.
     """
 
@@ -90,3 +93,4 @@ class NavigatorParams:
     # Deviations from upstream
     command_in_first_cycle: bool = deviation()
     stop_while_planning: bool = deviation()
+    check_plan_requests: bool = deviation()
