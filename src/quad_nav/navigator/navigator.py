@@ -327,19 +327,21 @@ class Navigator(StateMachine):
 
     # -- planning ------------------------------------------------------------------------
 
-    def make_plan(
-        self, start: Pose2D, goal: Pose2D, tolerance_m: float = 0.0
-    ) -> NDArray[np.float64]:
-        """Plan between two poses without flying, as the service ``~make_plan`` does.
+    def make_plan(self, start: Pose2D, goal: Pose2D) -> NDArray[np.float64]:
+        """Plan between two poses without flying.
 
         Returns:
             The plan, float64[n, 3] of (x_m, y_m, yaw_rad) in the global costmap's frame.
 
         Raises:
-            PlanningError: There is no plan, not even within the tolerance of the goal.
+            PlanningError: There is no plan.
         """
-        costmap, add_goal = self.global_costmap, self.params.make_plan_add_unreachable_goal
+        return self.plan_near(start, goal, 0.0)[0]
+
+    def plan_near(
+        self, start: Pose2D, goal: Pose2D, tolerance_m: float
+    ) -> Tuple[NDArray[np.float64], bool]:
+        """Plan without flying, to a point beside the goal if need be; see ``plan.planner``."""
+        costmap = self.global_costmap
         with closed_edge(costmap, start, goal, self.params.plan_inside_map):
-            return plan_near(
-                self.planner, costmap.spec, costmap.costs, start, goal, tolerance_m, add_goal
-            )
+            return plan_near(self.planner, costmap.spec, costmap.costs, start, goal, tolerance_m)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -266,11 +267,21 @@ def test_local_from_global_transforms_the_global_pose_to_the_local_one():
 
 
 def test_rings_around_a_goal():
-    first = list(ring_offsets(0.15, 0.15))
+    first = list(ring_offsets(0.25, 0.75, 0.75))
     # The axis points once each, the corners with both signs: 8 points of one ring.
     assert len(first) == len(set(first)) == 8
-    assert set(first) == {(x, y) for x in (-0.15, 0, 0.15) for y in (-0.15, 0, 0.15)} - {(0, 0)}
-    assert list(ring_offsets(0.15, 0.1)) == []
+    assert set(first) == {(x, y) for x in (-0.75, 0, 0.75) for y in (-0.75, 0, 0.75)} - {(0, 0)}
+
+
+def test_rings_are_summed_in_single_precision():
+    third, tenth = float(np.float32(0.3)), float(np.float32(0.1))
+    two = list(ring_offsets(0.05, third, third))
+    assert two[0] == (-0.15000000596046448, 0.0)
+    assert two[8] == (-0.30000001192092896, 0.0)
+    assert len(two) == 8 + 16
+    assert list(ring_offsets(0.05, tenth, tenth))[0] == (-tenth, 0.0)
+    assert list(ring_offsets(0.05, third, tenth)) == []
+    assert list(ring_offsets(0.05, math.inf, math.nan)) == []
 
 
 def test_shutdown_costmaps_skips_updates_without_a_goal():

@@ -8,6 +8,7 @@
 * It registers once. A ROS master that is started again does not know the node: nobody finds its
   services, and new nodes do not connect to its topics. Those that are connected stay so.
 * Each log call reads a parameter, and asks the master for it as long as it is not set.
+* Its services always say something when they refuse; those of roscpp send an empty text.
 * It connects a subscriber to publishers of its own process too, through a socket.
 * It has no public way to set the time, to add a callback to a subscriber, to ask whether a
   publisher reaches a node, to send bytes, to read from which node and topic a message came, and to
@@ -49,6 +50,7 @@ _ASK_AGAIN_S = 1.0
 _SHUTDOWN_S = 2.0
 _POLL_S = 0.1
 _WATCH_S = 2.0
+_REFUSED_WITHOUT_TEXT = "service cannot process request: "
 _START_SERVICE = "/simulation/start"
 _ROSOUT_PARAMETER = "/rosout_disable_topics_generation"
 _connect_topic: Callable[..., Tuple[int, str, int]] = ROSHandler._connect_topic
@@ -120,6 +122,17 @@ def hear_first(subscriber: rospy.Subscriber, on_first: Callable[[], object]) -> 
 def reaches(publisher: rospy.Publisher, node: str) -> bool:
     """Return whether a node has connected to a publisher."""
     return bool(publisher.impl.has_connection(node))
+
+
+def refuse_without_text(service: rospy.Service) -> None:
+    """Let a service that raises ``rospy.ServiceException("")`` refuse as roscpp's do."""
+
+    def write(transport: Any, text: str) -> None:
+        if text == _REFUSED_WITHOUT_TEXT:
+            text = ""
+        type(service)._write_service_error(service, transport, text)
+
+    service._write_service_error = write
 
 
 def accept_many_connections() -> None:

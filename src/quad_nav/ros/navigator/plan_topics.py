@@ -89,9 +89,8 @@ class PlanTopics:
             self._command.publish(twist_message(tick.command))
         if tick.plan is not None:
             self.publish_plan(tick.plan, now)
-        if tick.planning_failed and self._plan.get_num_connections() > 0:
-            nothing = path_message(np.zeros((0, 3)), self._global_frame, now)
-            self._plan.publish(nothing)  # removes the previous plan from displays
+        if tick.planning_failed:
+            self.publish_no_plan(now)
         if tick.plan is not None or tick.planning_failed:
             self._publish_potential(now)
         if tick.recovery is not None:
@@ -121,6 +120,11 @@ class PlanTopics:
         if isinstance(self._navigator.planner, Navfn):
             self._plan.publish(Path(message.header, message.poses[:-1]))
         self._plan.publish(message)
+
+    def publish_no_plan(self, now: rospy.Time) -> None:
+        """Remove the previous plan from displays."""
+        if self._plan.get_num_connections() > 0:
+            self._plan.publish(path_message(np.zeros((0, 3)), self._global_frame, now))
 
     def _publish_potential(self, now: rospy.Time) -> None:
         planner = self._navigator.planner
