@@ -43,14 +43,17 @@ class PlanServices:
     ) -> None:
         """Advertise the services; ``lock`` guards the navigator."""
         self._host, self._navigator = host, host.navigator
-        self._topics, self._lock, self._locate = topics, lock, locate
+        self._topics, self._lock, self._locate, self._names = topics, lock, locate, names
         self._frame = host.navigator.global_costmap.params.global_frame
-        self._make_plan_service = rospy.Service(names("~make_plan"), GetPlan, self._make_plan)
-        refuse_without_text(self._make_plan_service)
-        self._services = [rospy.Service(names("~clear_costmaps"), Empty, self._clear_costmaps)]
+        planner = plugin_name(host.navigator.params.base_global_planner)
+        self._of_planner = f"~{planner}/make_plan"
+        self._services = [
+            rospy.Service(names("~make_plan"), GetPlan, self._make_plan),
+            rospy.Service(names("~clear_costmaps"), Empty, self._clear_costmaps),
+        ]
+        refuse_without_text(self._services[0])
         if not isinstance(host.navigator.planner, Carrot):
-            planner = plugin_name(host.navigator.params.base_global_planner)
-            name = names(f"~{planner}/make_plan")
+            name = names(self._of_planner)
             self._services.append(rospy.Service(name, GetPlan, self._make_planner_plan))
 
     def _make_plan(self, request: GetPlanRequest) -> GetPlanResponse:
@@ -68,7 +71,7 @@ class PlanServices:
             if params.make_plan_clear_costmap:
                 radius_m = self._host.configuration.clearing_radius_m
                 self._navigator.free_surroundings(here, radius_m)
-            poses, is_near = self._poses(request, start, request.tolerance)
+            poses, is_near = self._poses("~make_plan", request, start, request.tolerance)
             if is_near and params.make_plan_add_unreachable_goal:
                 poses.append(request.goal)
             return GetPlanResponse(Path(poses=poses))
@@ -76,17 +79,17 @@ class PlanServices:
     def _make_planner_plan(self, request: GetPlanRequest) -> GetPlanResponse:
         """Plan from pose to pose, as the planners' own services do: the tolerance is not read."""
         with self._lock:
-            poses, _ = self._poses(request, None, 0.0)
+            poses, _ = self._poses(self._of_planner, request, None, 0.0)
             return GetPlanResponse(Path(Header(0, rospy.Time.now(), self._frame), poses))
 
     def _refusal(self, reason: str) -> rospy.ServiceException:
         """Return the error that a client gets; the original says nothing."""
-        rospy.logerr("%s: refused: %s", self._make_plan_service.resolved_name, reason)
+        rospy.logerr("%s: refused: %s", self._services[0].resolved_name, reason)
         explains = self._navigator.params.check_plan_requests
         return rospy.ServiceException(reason if explains else "")
 
     def _poses(
-        self, request: GetPlanRequest, start: Optional[Pose2D], tolerance_m: float
+        self, name: str, request: GetPlanRequest, start: Optional[Pose2D], tolerance_m: float
     ) -> Tuple[List[PoseStamped], bool]:
         """Plan, and publish what was found.
 
@@ -104,7 +107,7 @@ class PlanServices:
                 )
             plan, is_near = self._navigator.plan_near(start, goal, tolerance_m)
         except (InvalidGoal, PlanningError) as error:
-            rospy.logwarn("%s: no plan: %s", self._make_plan_service.resolved_name, error)
+            rospy.logwarn("%s: no plan: %s", rospy.resolve_name(self._names(name)), error)
             if isinstance(error, NoPath):
                 self._topics.publish_no_plan(now)
             return [], False
