@@ -11,7 +11,8 @@
 * Its services always say something when they refuse; those of roscpp send an empty text.
 * It connects a subscriber to publishers of its own process too, through a socket.
 * It has no public way to set the time, to add a callback to a subscriber, to ask whether a
-  publisher reaches a node, to send bytes, and to read from which node and topic a message came.
+  publisher reaches a node, to send bytes, to read from which node and topic a message came, and to
+  end a sleep.
 
 No other file touches what is private in rospy.
 """
@@ -181,6 +182,34 @@ def _register_if_unknown(master: rosgraph.Master) -> None:
         publishers = master.registerSubscriber(topic, kind, node)
         ServerProxy(node).publisherUpdate("/master", topic, publishers)
     rospy.logwarn("%s: registered again: the ROS master was restarted", rospy.get_name())
+
+
+class Alarm:
+    """A sleep by ROS's time that another thread may end."""
+
+    def __init__(self) -> None:
+        self._is_set = threading.Event()
+
+    def set(self) -> None:
+        """End the sleep that goes on, or else the next one."""
+        self._is_set.set()
+        condition = rospy.rostime.get_rostime_cond()
+        with condition:
+            condition.notify_all()
+
+    def sleep(self, seconds: float) -> None:
+        """Sleep until the time is over, the alarm is set, the clock jumps back or ROS ends."""
+        begin_s, condition = rospy.get_time(), rospy.rostime.get_rostime_cond()
+        patience_s = seconds if rospy.rostime.is_wallclock() else _POLL_S
+
+        def is_over() -> bool:
+            slept_s = rospy.get_time() - begin_s
+            return self._is_set.is_set() or not 0.0 <= slept_s < seconds
+
+        with condition:
+            while not rospy.is_shutdown() and not condition.wait_for(is_over, patience_s):
+                pass
+        self._is_set.clear()
 
 
 def set_time(now: rospy.Time) -> None:
