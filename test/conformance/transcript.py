@@ -5,15 +5,19 @@
 
 FILE is a session, by default each one in transcripts/. It is YAML:
 
+    base:     another session, of which this one is a variant
     world:    robot and surroundings, see transcript_world.World
     params:   the node's private parameters, those of costmaps and planners below their names
-    steps:    inputs in their order, or
-    recorded: file of recorded steps beside it (JSON, may be gzipped), after those of `steps`
+    steps:    inputs in their order
+    recorded: {file: FILE, config: NAME}, further steps: those of a list in JSON, which may be
+              gzipped, whose `config` or `session` is NAME
 
-A step has `family`, `input` and, if it was recorded, `expected`, the answer of C++ move_base:
+A step has `family`, `input` and, if it was recorded, `expected` or `cpp`, the answer of C++
+move_base; what that does not have is not compared:
 
-    service   {service: make_plan, start: [x, y, yaw, frame], goal: likewise, tolerance: m}
-    action    a goal or a cancel, see transcript_action
+    service   {service: make_plan, start: [x, y, yaw, frame], goal: likewise, tolerance: metres}
+    goal      [x, y, yaw, frame]; the next step comes when the goal is active
+    cancel    seconds to wait after a cancel of all goals
     wait      seconds of simulated time
     params    {name: value}, by dynamic_reconfigure; a name may have a namespace: GlobalPlanner/...
 
@@ -45,24 +49,36 @@ Answer = Callable[[Session, Any], Any]
 
 FAMILIES: Dict[str, Answer] = {
     "service": transcript_service.answer,
+    "goal": lambda session, place: session.send_goal(place),
+    "cancel": lambda session, seconds: session.cancel(seconds),
     "wait": lambda session, seconds: session.wait(seconds),
     "params": lambda session, changes: session.reconfigure(changes),
 }
 
 
 def load(path: Path) -> Dict[str, Any]:
-    """A session with its recorded steps behind its own."""
+    """A session with all its steps."""
     session = yaml.safe_load(path.read_text(encoding="utf-8"))
+    if "base" in session:
+        base = yaml.safe_load((path.parent / session.pop("base")).read_text(encoding="utf-8"))
+        session = merged(base, session)
     steps = list(session.get("steps", []))
     if "recorded" in session:
-        recorded = path.parent / session["recorded"]
+        recorded, name = path.parent / session["recorded"]["file"], session["recorded"]["config"]
         opened = gzip.open if recorded.suffix == ".gz" else open
         with opened(recorded, "rt", encoding="utf-8") as file:
-            steps += json.load(file)
+            steps += [s for s in json.load(file) if name in (s.get("config"), s.get("session"))]
     unknown = {step["family"] for step in steps} - FAMILIES.keys()
     if unknown:
-        raise ValueError(f"{path}: unknown families {sorted(unknown)}, expected {list(FAMILIES)}")
+        raise ValueError(f"unknown families {sorted(unknown)}, expected {list(FAMILIES)}")
     return {**session, "steps": steps}
+
+
+def merged(base: Dict[str, Any], changes: Dict[str, Any]) -> Dict[str, Any]:
+    """A tree with the values of another one in their places."""
+    both = {key: merged(base[key], changes[key]) for key in base.keys() & changes.keys()
+            if isinstance(base[key], dict) and isinstance(changes[key], dict)}  # fmt: skip
+    return {**base, **changes, **both}
 
 
 def play(path: Path, nav: str) -> List[Dict[str, Any]]:
@@ -75,11 +91,18 @@ def play(path: Path, nav: str) -> List[Dict[str, Any]]:
         ]
 
 
-def differing(transcript: List[Dict[str, Any]]) -> List[Dict[str, Any]]:
-    """The steps whose answer is not the recorded one."""
-    return [
-        step for step in transcript if "expected" in step and step["answer"] != step["expected"]
-    ]
+def recorded_answer(step: Dict[str, Any]) -> Any:
+    """What C++ move_base answered; None if that is not known."""
+    return step.get("expected", step.get("cpp"))
+
+
+def is_equal(answer: Any, recorded: Any) -> bool:
+    """Whether an answer is as recorded, in all that is recorded of it."""
+    if isinstance(recorded, dict):
+        return recorded.keys() <= answer.keys() and all(
+            answer[key] == value for key, value in recorded.items()
+        )
+    return bool(answer == recorded)
 
 
 def main() -> int:
@@ -98,9 +121,9 @@ def main() -> int:
         except (OSError, ValueError, KeyError, yaml.YAMLError, NotStarted) as error:
             print(f"{path}: {error}", file=sys.stderr)
             return EXIT_UNUSABLE
-        wrong = differing(transcript)
-        recorded = sum("expected" in step for step in transcript)
-        print(f"{path.stem}: {recorded - len(wrong)} of {recorded} answers are equal")
+        recorded = [step for step in transcript if recorded_answer(step) is not None]
+        wrong = [s for s in recorded if not is_equal(s["answer"], recorded_answer(s))]
+        print(f"{path.stem}: {len(recorded) - len(wrong)} of {len(recorded)} answers are equal")
         for step in wrong:
             print(f"  differs: {json.dumps(step['input'])}")
         differences += len(wrong)

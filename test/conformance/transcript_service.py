@@ -15,7 +15,8 @@ from transcript_world import pose_from_yaw
 def answer(session: Session, request: Dict[str, Any]) -> Dict[str, Any]:
     """Call a service: a plan's poses, frames and stamps, or {} of an empty answer.
 
-    ``stamps`` are seconds from the call, to a tenth; of ``header`` whether it has a stamp at all.
+    ``P`` are all poses, ``end`` the last two and ``last`` the last one. ``stamps`` are seconds from
+    the call, to a tenth; ``header`` has its frame and whether it has a stamp.
     """
     name, now = session.name(f"~{request['service']}"), session.now()
     kind = GetPlan if name.endswith("make_plan") else Empty
@@ -37,6 +38,8 @@ def answer(session: Session, request: Dict[str, Any]) -> Dict[str, Any]:
         "frames": sorted({session.anonymous(pose.header.frame_id) for pose in plan.poses}),
         "stamps": sorted({round((pose.header.stamp - now).to_sec(), 1) for pose in plan.poses}),
         "P": [numbers(pose.pose) for pose in plan.poses],
+        "last": [numbers(pose.pose) for pose in plan.poses[-1:]],
+        "end": [numbers(pose.pose) for pose in plan.poses[-2:]],
     }
 
 

@@ -10,13 +10,15 @@ import tempfile
 import threading
 import time
 from pathlib import Path
-from typing import Any, Dict
+from typing import Any, Dict, List, Sequence
 
 import dynamic_reconfigure.client
 import rosgraph
 import rospy
 import yaml
-from transcript_world import World, WorldTopics
+from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
+from move_base_msgs.msg import MoveBaseActionGoal
+from transcript_world import World, WorldTopics, pose_from_yaw
 
 NODE = "/move_base0"
 _ROBOT = "0"
@@ -37,6 +39,7 @@ class Session:
         self._nav, self._world = nav, World(**world)
         self._params = params
         self._ended = threading.Event()
+        self._clock = threading.Thread(target=self._run, daemon=True)
 
     def __enter__(self) -> Session:
         """Start it, and wait until the node answers."""
@@ -55,7 +58,10 @@ class Session:
             self._wait_until(rosgraph.is_master_online, "a ROS master")
             rospy.init_node("transcript", disable_signals=True)
             self._topics = WorldTopics(self._world, _ROBOT)
-            self._clock = threading.Thread(target=self._run, daemon=True)
+            self._statuses: List[int] = []
+            rospy.Subscriber("/move_base/status", GoalStatusArray, self._note_status)
+            self._goals = rospy.Publisher("/move_base/goal", MoveBaseActionGoal, queue_size=5)
+            self._cancels = rospy.Publisher("/move_base/cancel", GoalID, queue_size=5)
             self._clock.start()
             self._wait_until(self._is_up, f"the service {NODE}/make_plan")
         except BaseException:
@@ -66,8 +72,10 @@ class Session:
 
     def __exit__(self, *_: Any) -> None:
         """End the node and the master."""
-        rospy.signal_shutdown("the transcript is written")
         self._ended.set()
+        if self._clock.is_alive():
+            self._clock.join()
+        rospy.signal_shutdown("the transcript is written")
         self._launch.send_signal(signal.SIGINT)
         self._launch.wait()
         self._file.unlink()
@@ -105,6 +113,24 @@ class Session:
         end_s = self._world.now_s + seconds
         while self._world.now_s < end_s:
             time.sleep(_STEP_S / 2)
+
+    def send_goal(self, place: Sequence[Any]) -> None:
+        """Send a goal, and wait until it is active."""
+        goal = MoveBaseActionGoal()
+        x, y, turn, frame = place
+        goal.goal.target_pose.pose = pose_from_yaw(x, y, turn)
+        goal.goal.target_pose.header.frame_id = self.named(frame)
+        goal.goal.target_pose.header.stamp = goal.header.stamp = self.now()
+        self._goals.publish(goal)
+        self._wait_until(lambda: GoalStatus.ACTIVE in self._statuses, "active goal")
+
+    def cancel(self, seconds: float) -> None:
+        """Cancel all goals, and wait."""
+        self._cancels.publish(GoalID())
+        self.wait(seconds)
+
+    def _note_status(self, message: GoalStatusArray) -> None:
+        self._statuses = [one.status for one in message.status_list]
 
     def reconfigure(self, changes: Dict[str, Any]) -> None:
         """Change parameters of the node, or of a namespace below it."""

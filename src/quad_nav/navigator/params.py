@@ -31,9 +31,7 @@ class NavigatorParams:
             sends one more command before it.
         check_goals: A goal whose pose is not valid is aborted and the robot stops; False restores
             upstream behaviour, which tries it in every cycle or leaves the last command in force.
-        check_plan_requests: ``make_plan`` checks the poses and the tolerance of a request, takes
-            frames with a slash, and says why it refuses while a goal is active; False restores
-            upstream behaviour.
+            So for ``make_plan``: its requests are checked too, and a refusal has a reason.
         progress: Detection of a robot that makes no progress.
     """
 
@@ -100,4 +98,3 @@ class NavigatorParams:
     stop_while_planning: bool = deviation()
     interrupt_recoveries: bool = deviation()
     check_goals: bool = deviation()
-    check_plan_requests: bool = deviation()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import threading
 from typing import Callable, List, Optional, Tuple
 
@@ -43,12 +44,14 @@ class PlanServices:
     ) -> None:
         """Advertise the services; ``lock`` guards the navigator."""
         self._host, self._navigator = host, host.navigator
-        self._topics, self._lock, self._locate = topics, lock, locate
-        self._names = names
+        self._topics, self._lock, self._locate, self._names = topics, lock, locate, names
         self._frame = host.navigator.global_costmap.params.global_frame
-        self._make_plan_service = rospy.Service(names("~make_plan"), GetPlan, self._make_plan)
-        refuse_without_text(self._make_plan_service)
-        self._services = [rospy.Service(names("~clear_costmaps"), Empty, self._clear_costmaps)]
+        self._services = [
+            rospy.Service(names("~make_plan"), GetPlan, self._make_plan),
+            rospy.Service(names("~clear_costmaps"), Empty, self._clear_costmaps),
+        ]
+        refuse_without_text(self._services[0])
+        self._make_plan_name = self._services[0].resolved_name
         self._of_planner: List[rospy.Service] = []
         self.change_planner()
 
@@ -62,7 +65,8 @@ class PlanServices:
             service.shutdown()
         self._of_planner = []
         if not isinstance(self._navigator.planner, Carrot):
-            self._of_planner = [rospy.Service(name, GetPlan, self._make_planner_plan)]
+            handler = functools.partial(self._make_planner_plan, name)
+            self._of_planner.append(rospy.Service(name, GetPlan, handler))
 
     def _make_plan(self, request: GetPlanRequest) -> GetPlanResponse:
         with self._lock:
@@ -79,27 +83,27 @@ class PlanServices:
             if params.make_plan_clear_costmap:
                 radius_m = self._host.configuration.clearing_radius_m
                 self._navigator.free_surroundings(here, radius_m)
-            poses, is_near = self._poses(request, start, request.tolerance)
+            poses, is_near = self._poses(self._make_plan_name, request, start, request.tolerance)
             if is_near and params.make_plan_add_unreachable_goal:
                 poses.append(request.goal)
             return GetPlanResponse(Path(poses=poses))
 
-    def _make_planner_plan(self, request: GetPlanRequest) -> GetPlanResponse:
+    def _make_planner_plan(self, name: str, request: GetPlanRequest) -> GetPlanResponse:
         """Plan from pose to pose, as the planners' own services do: the tolerance is not read."""
         with self._lock:
-            poses, _ = self._poses(request, None, 0.0)
+            poses, _ = self._poses(name, request, None, 0.0)
             return GetPlanResponse(Path(Header(0, rospy.Time.now(), self._frame), poses))
 
     def _refusal(self, reason: str) -> rospy.ServiceException:
         """Return the error that a client gets; the original says nothing."""
-        rospy.logerr("%s: refused: %s", self._make_plan_service.resolved_name, reason)
-        explains = self._navigator.params.check_plan_requests
+        rospy.logerr("%s: refused: %s", self._make_plan_name, reason)
+        explains = self._navigator.params.check_goals
         return rospy.ServiceException(reason if explains else "")
 
     def _poses(
-        self, request: GetPlanRequest, start: Optional[Pose2D], tolerance_m: float
+        self, name: str, request: GetPlanRequest, start: Optional[Pose2D], tolerance_m: float
     ) -> Tuple[List[PoseStamped], bool]:
-        """Plan, and publish what was found.
+        """Plan, and publish what was found; ``name`` is the service's.
 
         Returns:
             The poses, none without a plan, and True if they lead to a point beside the goal.
@@ -108,14 +112,14 @@ class PlanServices:
         try:
             goal = self._in_plane("goal", request.goal)
             start = start or self._in_plane("start", request.start)
-            if self._navigator.params.check_plan_requests and not tolerance_m <= MAX_TOLERANCE_M:
+            if self._navigator.params.check_goals and not tolerance_m <= MAX_TOLERANCE_M:
                 # Every cell within it may be planned to, while the robot stands still.
                 raise InvalidGoal(
                     f"tolerance {tolerance_m:g} m, expected {MAX_TOLERANCE_M:g} m at most"
                 )
             plan, is_near = self._navigator.plan_near(start, goal, tolerance_m)
         except (InvalidGoal, PlanningError) as error:
-            rospy.logwarn("%s: no plan: %s", self._make_plan_service.resolved_name, error)
+            rospy.logwarn("%s: no plan: %s", name, error)
             if isinstance(error, NoPath):
                 self._topics.publish_no_plan(now)
             return [], False
@@ -133,7 +137,7 @@ class PlanServices:
         Raises:
             InvalidGoal: It is in another frame, or nothing can be planned with it.
         """
-        is_checked, frame = self._navigator.params.check_plan_requests, message.header.frame_id
+        is_checked, frame = self._navigator.params.check_goals, message.header.frame_id
         if (frame.lstrip("/") if is_checked else frame) != self._frame.lstrip("/"):
             raise InvalidGoal(f"the {what} is in frame '{frame}', expected '{self._frame}'")
         if is_checked:
