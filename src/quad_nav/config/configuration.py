@@ -117,6 +117,11 @@ class Configuration:
         """Both costmaps by name."""
         return {name: getattr(self, name) for name in COSTMAPS}
 
+    @property
+    def odom_topic(self) -> str:
+        """Topic of the odometry; of the local planners, DWAPlannerROS can have another one."""
+        return getattr(self.local_planner, "odom_topic", "") or "odom"
+
     def to_tree(self) -> Dict[str, Any]:
         """Return the parameter tree with ROS spellings, as move_base leaves it on the server.
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from quad_nav import config
 from quad_nav.config.robot_tree import RobotSource, robot_tree
+from quad_nav.control.dwa_planner import DwaPlanner
 from quad_nav.control.trajectory_planner import TrajectoryPlanner
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.scan_filter import ScanFilters, ScanSituation
@@ -66,6 +67,8 @@ def warm_up(configuration: config.Configuration) -> None:
     _add_scans(navigator, here)  # again, with the points of a peer to remove
     if isinstance(navigator.controller, TrajectoryPlanner) and navigator.controller.rollout:
         navigator.controller.rollout.score(np.zeros((1, 3)))  # of strafing, the last resort
+    if isinstance(navigator.controller, DwaPlanner):
+        navigator.controller.pop_trajectories()
 
 
 def _filter_scans(filters: ScanFilters, here: Pose2D) -> None:
