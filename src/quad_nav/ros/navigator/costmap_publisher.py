@@ -1,4 +1,4 @@
-"""Publish a costmap: the full grid, its updates, the footprint and marked voxels.
+"""Publish a costmap: the full grid, its updates, the footprint and the voxels.
 
 The rules are those of costmap_2d: publish only for subscribers; follow the schedule of
 `CostmapSchedule`; send each new subscriber one full grid, also with a publish frequency of 0.
@@ -10,11 +10,9 @@ import threading
 from typing import Any, Callable
 
 import rospy
-from geometry_msgs.msg import Point, PolygonStamped, Vector3
+from geometry_msgs.msg import PolygonStamped
 from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid
-from std_msgs.msg import ColorRGBA
-from visualization_msgs.msg import Marker
 
 from quad_nav.costmap.cost_grid import Window
 from quad_nav.costmap.layered import LayeredCostmap
@@ -23,9 +21,8 @@ from quad_nav.footprint import oriented
 from quad_nav.geometry import Pose2D
 from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.nav_messages import grid_message, polygon_message, update_message
+from quad_nav.ros.navigator.voxel_topics import VoxelTopics
 from quad_nav.topics.publishing import CostmapSchedule, Names
-
-_VOXEL_COLOUR = ColorRGBA(0.8, 0.3, 0.1, 0.6)
 
 Publish = Callable[[Any], None]
 """Sends a message to one subscriber or to all."""
@@ -66,10 +63,10 @@ class CostmapPublisher:
             queue_size=1,
             subscriber_listener=NewSubscriber(self._send_full),
         )
-        self._voxels = [  # C++ costmap_2d has a type of its own, and a node that converts it
-            (rospy.Publisher(f"{namespace}/{one}/voxel_markers", Marker, queue_size=1), layer)
-            for one, layer in costmap.layers.items()
-            if isinstance(layer, VoxelLayer) and layer.params.publish_voxel_map
+        self._voxels = [
+            VoxelTopics(f"{namespace}/{layer_name}", layer, costmap.params.global_frame)
+            for layer_name, layer in costmap.layers.items()
+            if isinstance(layer, VoxelLayer)
         ]
 
     def restart(self, now_s: float) -> None:
@@ -89,9 +86,8 @@ class CostmapPublisher:
             self._footprint.publish(
                 polygon_message(oriented(self._costmap.footprint, pose), params.global_frame, stamp)
             )
-        for publisher, layer in self._voxels:
-            if publisher.get_num_connections() > 0:
-                publisher.publish(voxel_marker(layer, params.global_frame, stamp))
+        for voxels in self._voxels:
+            voxels.publish(stamp)
         if self._schedule.add(now_s, window):
             self._publish_grid(stamp)
 
@@ -115,19 +111,3 @@ class CostmapPublisher:
         with self._lock:
             message = self._full(rospy.Time.now())
         send(message)
-
-
-def voxel_marker(layer: VoxelLayer, frame: str, stamp: rospy.Time) -> Marker:
-    """Return the marked voxels as one list of cubes, which replaces the previous one."""
-    resolution_m = layer.grid.spec.resolution_m
-    marker = Marker(
-        type=Marker.CUBE_LIST,
-        action=Marker.ADD,
-        ns="voxels",
-        color=_VOXEL_COLOUR,
-        scale=Vector3(resolution_m, resolution_m, layer.params.z_resolution_m),
-    )
-    marker.header.frame_id, marker.header.stamp = frame, stamp
-    marker.pose.orientation.w = 1.0
-    marker.points = [Point(*centre) for centre in layer.marked_voxels().tolist()]
-    return marker
