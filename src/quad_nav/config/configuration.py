@@ -8,6 +8,7 @@ from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 
 from quad_nav.config.costmaps import (
     COSTMAP_TABLE,
+    FOOTPRINT_KEYS,
     costmap_params,
     normalise_costmap,
     remark_on_blindness,
@@ -56,7 +57,7 @@ from quad_nav.parameter import POSITIVE, fixed_flag, fixed_number, fixed_whole
 from quad_nav.peers.peer_params import PeerParams
 
 # Costmaps look for these upwards too, to the node's level.
-_INHERITED = ("footprint", "robot_radius", "obstacle_range", "raytrace_range")
+_INHERITED = (*FOOTPRINT_KEYS, "obstacle_range", "raytrace_range")
 
 
 @dataclass(frozen=True)

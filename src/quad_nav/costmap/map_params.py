@@ -67,6 +67,12 @@ class MapParams:
     track_unknown_space: bool = fixed_flag(
         "track_unknown_space", False, "Cells are unknown, not free, until a sensor sees them."
     )
+    footprint_topic: str = fixed_text(
+        "footprint_topic", "footprint", "a topic's name", "Topic that sets the outline; a Polygon."
+    )
+    published_footprint_topic: str = fixed_text(
+        "published_footprint_topic", "footprint", "a topic's name", "Topic of the placed outline."
+    )
     always_send_full_costmap: bool = fixed_flag(
         "always_send_full_costmap", False, "Publish the whole grid, no updates."
     )

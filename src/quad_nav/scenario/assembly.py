@@ -104,14 +104,35 @@ def apply_configuration(navigator: Navigator, configuration: Configuration) -> N
     navigator.peers.params = configuration.peers
     navigator.global_costmap.reconfigure(_global_costmap(configuration))
     navigator.local_costmap.reconfigure(_local_costmap(configuration))
-    new_footprint = navigator.global_costmap.footprint
     # A user's planner has no parameters that change, and may hold a state of its own.
-    if not isinstance(configuration.global_planner, Plugin) or not np.array_equal(
-        footprint, new_footprint
-    ):
-        navigator.set_planner(build_global_planner(configuration.global_planner, new_footprint))
+    is_own = not isinstance(configuration.global_planner, Plugin)
     if not isinstance(configuration.local_planner, Plugin):
         navigator.set_controller_params(configuration.local_planner)
+    _pass_on_footprints(navigator, configuration, footprint, is_own)
+
+
+def set_footprint(
+    navigator: Navigator,
+    configuration: Configuration,
+    costmap: LayeredCostmap,
+    footprint: NDArray[np.float64],
+) -> None:
+    """Give a costmap, and its planner, another unpadded footprint, float64[n, 2] in metres."""
+    before = navigator.global_costmap.footprint
+    costmap.set_footprint(footprint)
+    _pass_on_footprints(navigator, configuration, before)
+
+
+def _pass_on_footprints(
+    navigator: Navigator,
+    configuration: Configuration,
+    before: NDArray[np.float64],
+    has_other_params: bool = False,
+) -> None:
+    """Pass the costmaps' footprints on to the planners; ``before`` was the global costmap's."""
+    footprint = navigator.global_costmap.footprint
+    if has_other_params or not np.array_equal(before, footprint):
+        navigator.set_planner(build_global_planner(configuration.global_planner, footprint))
     navigator.controller.set_footprint(navigator.local_costmap.footprint)
 
 

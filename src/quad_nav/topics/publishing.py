@@ -49,6 +49,11 @@ def in_fleet(number: int) -> Names:
     return resolved
 
 
+def topic_below(namespace: str, topic: str) -> str:
+    """Return the name of a topic of a namespace, unless it is absolute."""
+    return topic if topic.startswith("/") else f"{namespace}/{topic}"
+
+
 class CostmapSchedule:
     """Collect the windows that updates of a costmap change until publishing is due.
 

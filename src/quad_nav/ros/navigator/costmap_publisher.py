@@ -22,7 +22,7 @@ from quad_nav.geometry import Pose2D
 from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.nav_messages import grid_message, polygon_message, update_message
 from quad_nav.ros.navigator.voxel_topics import VoxelTopics
-from quad_nav.topics.publishing import CostmapSchedule, Names
+from quad_nav.topics.publishing import CostmapSchedule, Names, topic_below
 
 Publish = Callable[[Any], None]
 """Sends a message to one subscriber or to all."""
@@ -53,7 +53,8 @@ class CostmapPublisher:
         self._lock = lock
         self._schedule = CostmapSchedule(costmap)
         namespace = names(f"~{name}")
-        self._footprint = rospy.Publisher(f"{namespace}/footprint", PolygonStamped, queue_size=1)
+        topic = topic_below(namespace, costmap.params.published_footprint_topic)
+        self._footprint = rospy.Publisher(topic, PolygonStamped, queue_size=1)
         self._updates = rospy.Publisher(
             f"{namespace}/costmap_updates", OccupancyGridUpdate, queue_size=10
         )

@@ -20,6 +20,7 @@ from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator import static_maps
 from quad_nav.ros.navigator.costmap_publisher import CostmapPublisher
+from quad_nav.ros.navigator.footprint_topic import FootprintTopic
 from quad_nav.ros.navigator.goal_server import GoalServer
 from quad_nav.ros.navigator.health_meters import InputMeter, NavigatorHealth
 from quad_nav.ros.navigator.obstacle_topics import ObstacleTopics
@@ -55,6 +56,10 @@ class RobotInterface:
         self.lock = threading.RLock()
         self.warnings = ThrottledWarnings()
         self._host, self._navigator = host, host.navigator
+        self._footprints = [
+            FootprintTopic(self.name, name, costmap, names)
+            for name, costmap in zip(("global_costmap", "local_costmap"), host.costmaps)
+        ]
         self._publishers = {
             name: CostmapPublisher(f"{name}_costmap", costmap, self.lock, names)
             for name, costmap in zip(("global", "local"), host.costmaps)
@@ -77,7 +82,11 @@ class RobotInterface:
             return self._host.configuration
 
     def poll(self, now_s: float) -> None:
-        """Pass a waiting goal or cancel request to the navigator, if it accepts one now."""
+        """Take waiting footprints; pass a goal or cancel request on, if one is accepted now."""
+        for topic in self._footprints:
+            footprint = topic.pop()
+            if footprint is not None:
+                self._host.set_footprint(topic.costmap, footprint)
         self._goals.poll(self._navigator, now_s)
 
     def restart(self, now_s: float) -> None:
