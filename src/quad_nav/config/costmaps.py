@@ -67,7 +67,7 @@ def costmap_params(tree: Mapping[str, Any], name: str) -> CostmapParams:
         params = layer_params(costmap, name, plugin["name"], plugin["type"])
         if params is not None:
             layers.append((plugin["name"], with_fixes(params, tree)))
-    return made(CostmapParams, costmap, layers=tuple(layers))
+    return with_fixes(made(CostmapParams, costmap, layers=tuple(layers)), tree)
 
 
 def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:

@@ -7,7 +7,7 @@ The rules are those of costmap_2d: publish only for subscribers; follow the sche
 from __future__ import annotations
 
 import threading
-from typing import Any, Callable
+from typing import Any, Callable, Optional
 
 import rospy
 from geometry_msgs.msg import PolygonStamped
@@ -74,28 +74,32 @@ class CostmapPublisher:
         """Restart the schedule after a clock jump."""
         self._schedule.restart(now_s)
 
-    def publish(self, now_s: float, pose: Pose2D, window: Window) -> None:
-        """Publish what is due after an update of the costmap.
+    def publish(self, now_s: float, pose: Optional[Pose2D], window: Optional[Window]) -> None:
+        """Publish what is due at the time of an update of the costmap.
 
         Args:
             now_s: Time of the update.
-            pose: Robot pose in the costmap's global frame.
-            window: Window that the update changed.
+            pose: Robot pose in the costmap's global frame, None if unknown.
+            window: Window that the update changed, None if it was not made.
         """
-        params, stamp = self._costmap.params, time_message(now_s)
-        if self._footprint.get_num_connections() > 0:
-            self._footprint.publish(
-                polygon_message(oriented(self._costmap.footprint, pose), params.global_frame, stamp)
-            )
-        for voxels in self._voxels:
-            voxels.publish(stamp)
+        stamp = time_message(now_s)
+        if window is not None and pose is not None:
+            self._publish_update(pose, stamp)
         if self._schedule.add(now_s, window):
             self._publish_grid(stamp)
 
+    def _publish_update(self, pose: Pose2D, stamp: rospy.Time) -> None:
+        costmap, frame = self._costmap, self._costmap.params.global_frame
+        if self._footprint.get_num_connections() > 0:
+            points = oriented(costmap.footprint, pose)
+            self._footprint.publish(polygon_message(points, frame, stamp))
+        for voxels in self._voxels:
+            voxels.publish(stamp)
+
     def _publish_grid(self, stamp: rospy.Time) -> None:
+        if self._grid.get_num_connections() == 0:
+            return  # what changes meanwhile is in the first update
         costmap, changed = self._costmap, self._schedule.pop()
-        if self._grid.get_num_connections() == 0 and self._updates.get_num_connections() == 0:
-            return
         if self._schedule.pop_full_grid():
             self._grid.publish(self._full(stamp))
         elif not changed.is_empty:
@@ -111,4 +115,7 @@ class CostmapPublisher:
     def _send_full(self, send: Publish) -> None:
         with self._lock:
             message = self._full(rospy.Time.now())
+            # The first subscriber has the full grid by this; others may miss one that has moved.
+            if self._grid.get_num_connections() <= 1 or not self._costmap.params.publish_on_time:
+                self._schedule.pop_full_grid()
         send(message)

@@ -80,10 +80,10 @@ class PlanTopics:
             self._command.publish(twist_message(tick.command))
         if tick.plan is not None:
             self.publish_plan(tick.plan, now)
-        if tick.planning_failed and self._plan.get_num_connections() > 0:
+        if tick.no_path and self._plan.get_num_connections() > 0:
             nothing = path_message(np.zeros((0, 3)), self._global_frame, now)
             self._plan.publish(nothing)  # removes the previous plan from displays
-        if tick.plan is not None or tick.planning_failed:
+        if tick.plan is not None or tick.no_path:
             self._publish_potential(now)
         if tick.recovery is not None:
             self._recovery.publish(
