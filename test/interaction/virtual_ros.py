@@ -182,7 +182,9 @@ class Graph:
     def publish(self, topic, message, node=None):
         """Send a message, by default from the test."""
         for subscriber in list(self.topics[topic][1]):
-            subscriber.receive(message, (node or self._test).name)
+            types = {subscriber.data_class._md5sum, message._md5sum}
+            if len(types) == 1 or "*" in types:  # costmaps have two topics of one name
+                subscriber.receive(message, (node or self._test).name)
 
     def call(self, name, request=None):
         """Call a service and wait for its response.
@@ -274,6 +276,9 @@ class Subscriber:
 
     def get_num_connections(self):
         return len(self._publishers)
+
+    def has_connection(self, _):
+        return True
 
     def add_callback(self, callback, args):
         self._callbacks.append((callback, args))

@@ -34,6 +34,9 @@ class FakeImpl:
     def remove_callback(self, callback: Callable, args: Any) -> None:
         self.callbacks.remove((callback, args))
 
+    def has_connection(self, address: str) -> bool:
+        return True
+
 
 class FakeSubscriber:
     """Subscriber whose messages come from `receive`."""

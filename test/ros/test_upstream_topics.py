@@ -4,7 +4,6 @@
 One flight of robot 0 is recorded; robot 1 stands. Intended differences:
 
 * each robot has the action's topics for itself (``upstream_case.OURS``);
-* the navigator does not subscribe to its own footprints;
 * updates of the costmaps come exactly at ``publish_frequency``, not at the next turn after it.
 """
 
@@ -87,9 +86,8 @@ class UpstreamTopics(UpstreamCase):
         types = dict(master.getTopicTypes())
         for i in ROBOTS:
             for name, kind in recorded_lines("subscriptions.txt", i):
-                if not name.endswith("/footprint"):  # its own: see above
-                    self.assertIn(f"/move_base{i}", subscribers.get(name, ()), name)
-                    self.assertEqual(types.get(name), kind, name)
+                self.assertIn(f"/move_base{i}", subscribers.get(name, ()), name)
+                self.assertEqual(types.get(name), kind, name)
 
     def test_every_service_has_its_type(self):
         for i in ROBOTS:

@@ -8,6 +8,7 @@ from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 
 from quad_nav.config.costmaps import (
     COSTMAP_TABLE,
+    FOOTPRINT_KEYS,
     costmap_params,
     normalise_costmap,
     remark_on_blindness,
@@ -56,7 +57,7 @@ from quad_nav.parameter import POSITIVE, fixed_flag, fixed_number, fixed_whole
 from quad_nav.peers.peer_params import PeerParams
 
 # Costmaps look for these upwards too, to the node's level.
-_INHERITED = ("footprint", "robot_radius", "obstacle_range", "raytrace_range")
+_INHERITED = (*FOOTPRINT_KEYS, "obstacle_range", "raytrace_range")
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,11 @@ class Configuration:
     def costmaps(self) -> Dict[str, CostmapParams]:
         """Both costmaps by name."""
         return {name: getattr(self, name) for name in COSTMAPS}
+
+    @property
+    def odom_topic(self) -> str:
+        """Topic of the odometry; of the local planners, DWAPlannerROS can have another one."""
+        return getattr(self.local_planner, "odom_topic", "") or "odom"
 
     def to_tree(self) -> Dict[str, Any]:
         """Return the parameter tree with ROS spellings, as move_base leaves it on the server.

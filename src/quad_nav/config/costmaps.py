@@ -24,6 +24,13 @@ from quad_nav.files.number_texts import polygon_from_list, text_from_polygon
 COSTMAP_TABLE = Table((CostmapParams,))
 OBSTACLE, VOXEL = "costmap_2d::ObstacleLayer", "costmap_2d::VoxelLayer"
 STATIC, INFLATION = "costmap_2d::StaticLayer", "costmap_2d::InflationLayer"
+FOOTPRINT_KEYS = (
+    "footprint",
+    "robot_radius",
+    "footprint_topic",
+    "published_footprint_topic",
+)
+"""Parameters of a costmap that move_base looks for upwards too, to the node's level."""
 _OLD_STYLE = ("static_map", "map_type")
 
 
@@ -60,7 +67,7 @@ def costmap_params(tree: Mapping[str, Any], name: str) -> CostmapParams:
         params = layer_params(costmap, name, plugin["name"], plugin["type"])
         if params is not None:
             layers.append((plugin["name"], with_fixes(params, tree)))
-    return made(CostmapParams, costmap, layers=tuple(layers))
+    return with_fixes(made(CostmapParams, costmap, layers=tuple(layers)), tree)
 
 
 def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:
@@ -76,8 +83,8 @@ def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:
 
 
 def _normalise_footprint(costmap: Namespace, name: str, tree: Namespace, notes: Notes) -> None:
-    """Inherit footprint and radius from the node's level; convert a list to a string."""
-    for key in ("footprint", "robot_radius"):
+    """Inherit the outline and its topics from the node's level; convert a list to a string."""
+    for key in FOOTPRINT_KEYS:
         if key not in costmap and key in tree:
             costmap[key] = tree[key]
             notes.moved(join(name, key), key)

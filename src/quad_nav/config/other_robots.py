@@ -130,6 +130,7 @@ class _Fit:
             for namespace in (costmap, *_below(costmap)):
                 self._map_map_topic(namespace)
                 self._raise_heights(namespace)
+        self._map_odometry()
         body = self._body()
         self._add_remarks(body)
 
@@ -178,6 +179,13 @@ class _Fit:
         if given.lstrip("/") != own:
             self._note("frames", f"{given} is {own.replace(str(self._number), '{i}')}")
         return own
+
+    def _map_odometry(self) -> None:
+        planner, own = _source(self.tree, plugin_name(_DWA)), f"odom{self._number}"
+        topic = planner.get("odom_topic")
+        if isinstance(topic, str) and topic.lstrip("/") not in ("odom", own):
+            self._note("topics", f"{topic} is /odom{{i}}")
+            planner["odom_topic"] = f"/{own}"
 
     def _map_map_topic(self, namespace: Dict[str, Any]) -> None:
         topic = namespace.get("map_topic")

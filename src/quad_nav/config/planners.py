@@ -99,10 +99,6 @@ LOCAL_PLANNERS: Dict[str, Table] = {
     DWA_PLANNER: Table(
         (DwaParams,),
         restores=True,
-        unsupported={
-            "publish_traj_pc": "the sampled trajectories are not published",
-            "odom_topic": "the topic of the odometry is odom; remap it",
-        },
         # The planner warns about names from before ROS Melodic and does not read them.
         ignored={
             "max_trans_vel": "renamed to max_vel_trans",

@@ -71,7 +71,12 @@ class Critics:
 
     ``grids`` are those of an earlier call to use again; without them they are measured on ``plan``,
     float64[m, 3], m >= 1, in the costmap's frame.
+
+    Attributes:
+        searched: What ``choose`` scored, and the samples, float64[n, 3].
     """
+
+    searched: Tuple[dwa_search.Critics, NDArray[np.float64]]
 
     def __init__(
         self,
@@ -109,7 +114,8 @@ class Critics:
         """Return the cheapest sampled trajectory, of cost NO_LEGAL_TRAJECTORY if none is legal."""
         goal = Pose2D(*single(self.goal.x_m, self.goal.y_m, self.goal.yaw_rad))
         samples = velocity_samples(self.params, self.pose, self.velocity, goal, control_period_s)
-        k, cost = dwa_search.cheapest(self.critics(samples, oscillation), samples)
+        self.searched = self.critics(samples, oscillation), samples
+        k, cost = dwa_search.cheapest(*self.searched)
         if k < 0:
             return Trajectory((0.0, 0.0, 0.0), NO_LEGAL_TRAJECTORY, np.zeros((0, 3)))
         points, command = self.simulate(samples[k])

@@ -210,14 +210,15 @@ def is_within_reach(
             if max(distances[PATH], distances[GOAL]) >= grids.path.size:
                 return False
     if grids.follows_goal or grids.aligns:
-        return _has_nose_on_map(grids, points, count, distances)
+        return has_nose_on_map(grids, points, count, distances)
     return True
 
 
 @njit(cache=True, nogil=True)
-def _has_nose_on_map(
+def has_nose_on_map(
     grids: MapGrids, points: NDArray[np.float64], count: int, distances: NDArray[np.float64]
 ) -> bool:
+    """Tell whether the robot's nose is on the map at every pose; see ``is_within_reach``."""
     size_y, size_x = grids.path.shape
     forward = grids.forward_point_distance_m
     border = abs(forward) + grids.costmap.resolution_m

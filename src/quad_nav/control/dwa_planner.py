@@ -18,6 +18,7 @@ from quad_nav.control.controller import IDENTITY, Control
 from quad_nav.control.dwa_critics import Critics, DwaGrids, acceleration_limits
 from quad_nav.control.dwa_oscillation import OscillationCritic
 from quad_nav.control.dwa_planner_params import DwaParams
+from quad_nav.control.dwa_trajectories import explored_points
 from quad_nav.control.map_grid import cost_cloud
 from quad_nav.control.plan_follower import NO_POSES, PlanFollower, is_stopped, plan_end
 from quad_nav.control.rollout import Trajectory
@@ -45,6 +46,7 @@ class DwaPlanner(PlanFollower):
         self.best: Optional[Trajectory] = None
         self.critics: Optional[Critics] = None
         self._grids: Optional[DwaGrids] = None  # of the last search
+        self._shown: Optional[Critics] = None  # the last search, until it is asked for
 
     def set_plan(self, plan: NDArray[np.float64]) -> None:
         """Take a new global plan, and forget oscillation."""
@@ -95,6 +97,14 @@ class DwaPlanner(PlanFollower):
         scales = critics.path_scale, critics.goal_scale, critics.params.occdist_scale
         return cost_cloud(critics.costmap, critics.grids.path, critics.grids.goal, usable, scales)
 
+    def pop_trajectories(self) -> Optional[NDArray[np.float32]]:
+        """Return the points of all trajectories of a search once, see ``explored_points``.
+
+        None without a search since the last call.
+        """
+        shown, self._shown = self._shown, None
+        return None if shown is None else explored_points(*shown.searched)
+
     def _is_at(self, goal: Pose2D, pose: Pose2D) -> bool:
         latched = self.params.latch_xy_goal_tolerance and self.xy_tolerance_latch
         return latched or pose.distance_to(goal) <= self.params.xy_goal_tolerance_m
@@ -132,7 +142,7 @@ class DwaPlanner(PlanFollower):
     ) -> Trajectory:
         plan = self.local_global_plan
         self.critics = Critics(self.params, spec, costs, self.footprint, plan, pose, velocity)
-        self._grids = self.critics.grids
+        self._grids, self._shown = self.critics.grids, self.critics
         self.best = self.critics.choose(self.oscillation, self.control_period_s)
         if self.best.cost >= 0.0:
             self.oscillation.record(

@@ -108,15 +108,22 @@ class DwaParams:
     publish_cost_grid_pc: bool = fixed_flag(
         "publish_cost_grid_pc", False, "Publish the scores of all cells as a point cloud."
     )
+    publish_traj_pc: bool = fixed_flag(
+        "publish_traj_pc", False, "Publish all sampled trajectories as a point cloud."
+    )
     global_frame_id: str = fixed_text(
-        "global_frame_id", "odom", "a frame's name", "Frame of the point cloud of scores."
+        "global_frame_id", "odom", "a frame's name", "Frame of trajectory_cloud as upstream."
+    )
+    odom_topic: str = fixed_text(
+        "odom_topic", "odom", "a topic's name", "Topic of the odometry, in the node's namespace."
     )
     controller_frequency_hz: Optional[float] = fixed_number(
         "controller_frequency", None, "Hz", "Rate that sampling assumes; move_base's if unset.", ANY
     )
 
-    # Deviation from upstream
+    # Deviations from upstream
     predict_goal_turn: bool = deviation()  # turn no farther in one period than is left
+    stamp_frame_of_costmap: bool = deviation()  # trajectory_cloud names the frame that it is in
 
     # The turn at the goal has the limits of every turn, by the names of ``goal.GoalLimits``.
     @property

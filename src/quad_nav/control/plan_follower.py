@@ -46,7 +46,7 @@ class PlanFollower:
         self.rotating_to_goal = False
         self.xy_tolerance_latch = False
         self._goal_reached = False
-        self.set_footprint(footprint)
+        self.footprint = np.array(footprint, dtype=np.float64, order="C")
 
     def set_params(self, params: Any) -> None:
         """Take other parameters; plan and state stay, but the goal is no longer reached."""

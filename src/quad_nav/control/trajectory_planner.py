@@ -47,6 +47,11 @@ class TrajectoryPlanner(PlanFollower):
         self.best: Optional[Trajectory] = None
         self.rollout: Optional[Rollout] = None
 
+    def set_footprint(self, footprint: NDArray[np.float64]) -> None:
+        """Take another padded footprint; upstream keeps that of the start."""
+        if self.params.follow_footprint:
+            super().set_footprint(footprint)
+
     def compute_velocity(
         self,
         spec: GridSpec,

@@ -134,6 +134,7 @@ class TrajectoryPlannerParams:
     # Deviations from upstream
     reject_colliding_escape: bool = deviation()  # escape backwards only where nothing is hit
     end_blocked_escape: bool = deviation()  # an escape that cannot go on allows forward samples
+    follow_footprint: bool = deviation()  # check with the footprint in force, not the first one
     predict_goal_turn: bool = deviation()  # turn no farther in one period than is left
 
     @property

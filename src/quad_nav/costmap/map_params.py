@@ -8,6 +8,7 @@ from typing import Optional
 from quad_nav.files.number_texts import Polygon, polygon_from_text
 from quad_nav.parameter import (
     POSITIVE,
+    deviation,
     fixed_flag,
     fixed_number,
     fixed_text,
@@ -27,6 +28,10 @@ class MapParams:
 
     Attributes:
         footprint: Unpadded, in the robot's frame; None for a circle of ``robot_radius_m``.
+        publish_on_time: Publish at the rate that is asked for, only what has changed, and a map
+            that has moved in full to every subscriber. False restores upstream behaviour: more
+            than a period lies between two messages, the last window is repeated while there is
+            none, and a new subscriber's full map counts as everybody's.
     """
 
     transform_tolerance_s: float = number(
@@ -67,6 +72,12 @@ class MapParams:
     track_unknown_space: bool = fixed_flag(
         "track_unknown_space", False, "Cells are unknown, not free, until a sensor sees them."
     )
+    footprint_topic: str = fixed_text(
+        "footprint_topic", "footprint", "a topic's name", "Topic that sets the outline; a Polygon."
+    )
+    published_footprint_topic: str = fixed_text(
+        "published_footprint_topic", "footprint", "a topic's name", "Topic of the placed outline."
+    )
     always_send_full_costmap: bool = fixed_flag(
         "always_send_full_costmap", False, "Publish the whole grid, no updates."
     )
@@ -76,3 +87,4 @@ class MapParams:
     circumscribed_radius_m: float = fixed_number(
         "circumscribed_radius", 0.46, "metres", "Sizes what recoveries and make_plan clear."
     )
+    publish_on_time: bool = deviation()

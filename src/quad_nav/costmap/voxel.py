@@ -16,6 +16,7 @@ stay, and count again when a sensor sees something in their column.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Iterator, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,14 @@ from numpy.typing import NDArray
 from quad_nav.costmap.cost_grid import shift
 from quad_nav.costmap.observation import ObservationBuffer
 from quad_nav.costmap.obstacle import ObstacleLayer, ObstacleLayerParams, combination_choice
-from quad_nav.costmap.voxel_kernel import RayLimits, VoxelGrid, clear_voxel_rays, mark_voxels
+from quad_nav.costmap.voxel_kernel import (
+    RayLimits,
+    VoxelGrid,
+    clear_voxel_rays,
+    is_inside,
+    mark_voxels,
+    ray_ends,
+)
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
 from quad_nav.parameter import POSITIVE, deviation, fixed_flag, positive, signed, whole
@@ -54,7 +62,7 @@ class VoxelLayerParams(ObstacleLayerParams):
     combination_method: int = combination_choice()
 
     publish_voxel_map: bool = fixed_flag(
-        "publish_voxel_map", False, "Publish the marked voxels as markers."
+        "publish_voxel_map", False, "Publish the voxels, and the marked ones as markers."
     )
     clip_voxel_rays: bool = deviation()
     redraw_emptied_voxels: bool = deviation()
@@ -135,6 +143,32 @@ class VoxelLayer(ObstacleLayer):
         y, x, z = np.nonzero(self.voxels == LETHAL)
         return self._origin + (np.column_stack((x, y, z)) + 0.5) * self._voxel_size
 
+    def packed_voxels(self) -> NDArray[np.uint32]:
+        """Return the columns as costmap_2d keeps them, uint32[H, W].
+
+        Bit k is set unless the voxel k is free, bit 16 + k if it is marked. Without such a voxel
+        bit k is set, too.
+        """
+        count = self.params.z_voxels
+        bits = np.left_shift(1, np.arange(count))
+        occupied = (self.voxels != FREE) @ bits + (0x10000 - (1 << count))
+        packed: NDArray[np.uint32] = (((self.voxels == LETHAL) @ bits << 16) + occupied).astype(
+            np.uint32
+        )
+        return packed
+
+    def clearing_ends(self) -> Iterator[Tuple[float, NDArray[np.float32]]]:
+        """Yield (stamp, float32[n, 3]): the ends of the rays of each observation that clears.
+
+        They are those of the last update, in the global frame.
+        """
+        grid = self._voxel_grid()
+        for buffer in self.buffers.values():
+            for seen in buffer.observations if buffer.params.clearing else ():
+                if len(seen.points) and is_inside(grid, *seen.sensor.tolist()):
+                    ends = ray_ends(grid, seen.sensor, seen.points, self._limits(buffer))
+                    yield seen.stamp_s, ends
+
     def _make_voxels(self) -> None:
         self.voxels = np.full(
             (*self.grid.spec.shape, self.params.z_voxels), UNKNOWN, dtype=np.uint8
@@ -156,8 +190,7 @@ class VoxelLayer(ObstacleLayer):
             shift(self.voxels, move_x, move_y, UNKNOWN)
 
     def _clear(self, buffer: ObservationBuffer, touched: NDArray[np.float64]) -> None:
-        grid, ranges = self._voxel_grid(), self._ranges(buffer.params)
-        limits = RayLimits(ranges.clear_m, ranges.max_height_m, self.params.clip_voxel_rays)
+        grid, limits = self._voxel_grid(), self._limits(buffer)
         for seen in buffer.observations:
             clear_voxel_rays(grid, seen.sensor, seen.points, limits, touched)
 
@@ -165,6 +198,10 @@ class VoxelLayer(ObstacleLayer):
         grid, ranges = self._voxel_grid(), self._ranges(buffer.params)
         for seen in buffer.observations:
             mark_voxels(grid, seen.sensor, seen.marks, ranges.mark_m, ranges.max_height_m, touched)
+
+    def _limits(self, buffer: ObservationBuffer) -> RayLimits:
+        ranges = self._ranges(buffer.params)
+        return RayLimits(ranges.clear_m, ranges.max_height_m, self.params.clip_voxel_rays)
 
     def _voxel_grid(self) -> VoxelGrid:
         return VoxelGrid(

@@ -51,12 +51,7 @@ def clear_voxel_rays(
     clears nothing; then the result is False.
     """
     origin, size = grid.origin, grid.size
-    size_y, size_x, size_z = grid.voxels.shape
-    if (
-        cell_index(sensor[0], origin[0], size[0], size_x) < 0
-        or cell_index(sensor[1], origin[1], size[1], size_y) < 0
-        or cell_index(sensor[2], origin[2], size[2], size_z) < 0
-    ):
+    if not is_inside(grid, sensor[0], sensor[1], sensor[2]):
         return False
     if limits.clip:
         include(bounds, sensor[0], sensor[1])
@@ -69,11 +64,7 @@ def clear_voxel_rays(
     )
     for k in range(points.shape[0]):
         x, y, z = ray_end(grid, sensor, points[k], limits)
-        if (
-            cell_index(x, origin[0], size[0], size_x) < 0
-            or cell_index(y, origin[1], size[1], size_y) < 0
-            or cell_index(z, origin[2], size[2], size_z) < 0
-        ):
+        if not is_inside(grid, x, y, z):
             continue
         end = (x - origin[0]) / size[0], (y - origin[1]) / size[1], (z - origin[2]) / size[2]
         clear_voxel_line(grid, begin, end, max_voxels)
@@ -82,6 +73,32 @@ def clear_voxel_rays(
         scale = range_m / length if length > range_m else 1.0
         include(bounds, sensor[0] + dx * scale, sensor[1] + dy * scale)
     return True
+
+
+@njit(cache=True, nogil=True)
+def is_inside(grid: VoxelGrid, x: float, y: float, z: float) -> bool:
+    """Tell whether a point is in one of the voxels."""
+    origin, size = grid.origin, grid.size
+    size_y, size_x, size_z = grid.voxels.shape
+    return (
+        cell_index(x, origin[0], size[0], size_x) >= 0
+        and cell_index(y, origin[1], size[1], size_y) >= 0
+        and cell_index(z, origin[2], size[2], size_z) >= 0
+    )
+
+
+@njit(cache=True, nogil=True)
+def ray_ends(
+    grid: VoxelGrid, sensor: NDArray[np.float64], points: NDArray[np.float32], limits: RayLimits
+) -> NDArray[np.float32]:
+    """Return the ends of the rays that clear, float32[n, 3]; see ``clear_voxel_rays``."""
+    ends, count = np.empty((points.shape[0], 3), np.float32), 0
+    for k in range(points.shape[0]):
+        x, y, z = ray_end(grid, sensor, points[k], limits)
+        if is_inside(grid, x, y, z):
+            ends[count, 0], ends[count, 1], ends[count, 2] = x, y, z
+            count += 1
+    return ends[:count]
 
 
 @njit(cache=True, nogil=True)

@@ -20,6 +20,8 @@ class CostmapUpdates:
             "local": (local_costmap, Schedule(local_costmap.params.update_frequency_hz)),
         }
 
+        self._rests = False
+
     def start(self, now_s: float) -> None:
         """Make both updates due now."""
         for _, schedule in self._costmaps.values():
@@ -31,14 +33,20 @@ class CostmapUpdates:
         (_, of_global), (_, of_local) = self._costmaps["global"], self._costmaps["local"]
         return min(of_global.due_s, of_local.due_s)
 
-    def update(self, tick: Tick, poses: RobotPoses) -> None:
-        """Run the updates that are due; the changed windows go into the tick."""
+    def update(self, tick: Tick, poses: RobotPoses, rests: bool) -> None:
+        """Run the updates that are due, none if the costmaps rest; the windows go into the tick."""
+        if self._rests and not rests:
+            self.start(tick.now_s)  # plans need costmaps that are up to date
+        self._rests = rests
         of_costmaps = {"global": poses.in_global, "local": poses.in_local}
         for name, (costmap, schedule) in self._costmaps.items():
             schedule.set_frequency(costmap.params.update_frequency_hz, tick.now_s)
             if not schedule.pop(tick.now_s):
                 continue
             pose = of_costmaps[name]
+            tick.windows[name] = None
+            if rests:
+                continue
             if pose is None:
                 tick.warnings.append(f"{name} costmap not updated: robot pose unknown")
                 continue

@@ -155,8 +155,7 @@ class Navigator(StateMachine):
         """Time at which the next tick has something to do; -inf before the first."""
         if not self._started:
             return -math.inf
-        due_s = math.inf if self._costmaps_rest else self._updates.due_s
-        due_s = min(due_s, self._control.limiter.due_s)
+        due_s = min(self._updates.due_s, self._control.limiter.due_s)
         if self.state is not State.IDLE:
             return min(due_s, self.due_s)
         due_s = min(due_s, self.filters.idle_due_s)
@@ -203,8 +202,8 @@ class Navigator(StateMachine):
             self._updates.start(now_s)
         tick = Tick(now_s)
         self._observe_peers(tick, poses, peers, tracks)
-        if not self._costmaps_rest:
-            self._updates.update(tick, poses)
+        rest = self.params.shutdown_costmaps and self.state is State.IDLE
+        self._updates.update(tick, poses, rest)
         if poses.in_global is not None:
             self._control.limiter.check(now_s, poses.in_global)
         self._propose(tick, poses, velocity)
@@ -308,10 +307,6 @@ class Navigator(StateMachine):
             self.start_goal(advice.manoeuvre_goal, tick.now_s)
 
     # -- costmaps ------------------------------------------------------------------------
-
-    @property
-    def _costmaps_rest(self) -> bool:
-        return self.params.shutdown_costmaps and self.state is State.IDLE
 
     def clear_costmaps(self, now_s: float) -> None:
         """Reset the layers of both costmaps, as the service ``~clear_costmaps`` does."""

@@ -14,7 +14,7 @@ from typing import Optional
 from quad_nav.control.escape import escape
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.map_edge import closed_edge
-from quad_nav.errors import PlanningError
+from quad_nav.errors import NoPath, PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.navigator.command_filter import StopReason
 from quad_nav.navigator.control_supervisor import ControlSupervisor, StuckAction
@@ -174,7 +174,7 @@ class StateMachine:
             with closed_edge(costmap, start, target, self.params.plan_inside_map):
                 tick.plan = self.planner.make_plan(costmap.spec, costmap.costs, start, target)
         except PlanningError as error:
-            tick.planning_failed = str(error)
+            tick.planning_failed, tick.no_path = str(error), isinstance(error, NoPath)
             if self._peers.holding_point is not None:
                 self._peers.reject_holding_point()
             if self.state is State.PLANNING and self._search.fail(tick.now_s, self.params):

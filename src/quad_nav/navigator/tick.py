@@ -79,13 +79,15 @@ class Tick:
     Attributes:
         now_s: Time of the step.
         state: State after the step.
-        windows: Cells that costmap updates changed, by costmap: "global", "local".
+        windows: Cells that costmap updates changed, by costmap: "global", "local". None at the
+            time of an update that is not made: the costmap rests, or the pose is unknown.
         cycle: A control cycle ran.
         command: Command to publish now, if any.
         stop: Why that command is a stop, None if it is none.
         plan: New global plan, float64[n, 3] of (x_m, y_m, yaw_rad) in the global costmap's
             frame.
         planning_failed: Why the search for a plan failed, "" if it did not.
+        no_path: That search was made; none is where start or goal is outside of the map.
         control: Result of the local planner.
         recovery: The recovery behaviour that started.
         outcome: End of the goal.
@@ -100,12 +102,13 @@ class Tick:
 
     now_s: float
     state: State = State.IDLE
-    windows: Dict[str, Window] = field(default_factory=dict)
+    windows: Dict[str, Optional[Window]] = field(default_factory=dict)
     cycle: bool = False
     command: Optional[Twist2D] = None
     stop: Optional[StopReason] = None
     plan: Optional[NDArray[np.float64]] = None
     planning_failed: str = ""
+    no_path: bool = False
     control: Optional[Control] = None
     recovery: Optional[RecoveryStart] = None
     outcome: Optional[Outcome] = None

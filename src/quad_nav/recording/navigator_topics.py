@@ -76,7 +76,8 @@ class NavigatorTopics:
             self.action.feedback(tick.now_s, poses.in_global)
         pose_of = {"global": poses.in_global, "local": poses.in_local}
         for name, window in tick.windows.items():
-            self._write_costmap(name, window, pose_of[name], tick.now_s)
+            if window is not None:
+                self._write_costmap(name, window, pose_of[name], tick.now_s)
         if tick.outcome is not None:
             self.action.finish(tick.now_s, tick.outcome)
 
@@ -97,7 +98,7 @@ class NavigatorTopics:
 
     def _write_plans(self, tick: Tick, stamp: int) -> None:
         """Write the plans; a failed search publishes an empty plan, which clears the display."""
-        plan = tick.plan if tick.plan is not None else _NO_PLAN if tick.planning_failed else None
+        plan = tick.plan if tick.plan is not None else _NO_PLAN if tick.no_path else None
         if plan is not None:
             frame = self._navigator.global_costmap.params.global_frame
             planner = plugin_name(self._navigator.params.base_global_planner)

@@ -126,6 +126,21 @@ def apply_configuration(navigator: Navigator, configuration: Configuration) -> N
     controller.set_footprint(local_footprint)
 
 
+def set_footprint(
+    navigator: Navigator,
+    configuration: Configuration,
+    costmap: LayeredCostmap,
+    footprint: NDArray[np.float64],
+) -> None:
+    """Give a costmap, and its planner, another unpadded footprint, float64[n, 2] in metres."""
+    costmap.set_footprint(footprint)
+    if costmap is navigator.local_costmap:
+        navigator.controller.set_footprint(costmap.footprint)
+    else:
+        planner = build_global_planner(configuration.global_planner, costmap.footprint)
+        navigator.set_planner(planner)
+
+
 def _slow_down(navigator: Navigator, configuration: Configuration) -> None:
     """Let recoveries limit the speeds of the local planner in use."""
     for named, (_, params) in zip(navigator.recoveries, configuration.recoveries):

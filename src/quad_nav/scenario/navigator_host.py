@@ -15,12 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.config import Configuration
+from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.scan_intake import ScanIntake, Sink
 from quad_nav.costmap.scan_validator import ScanValidator
 from quad_nav.geometry import Twist2D
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.peers.peer import Peer
-from quad_nav.scenario.assembly import apply_configuration, build_navigator, build_scan_filters
+from quad_nav.scenario.assembly import (
+    apply_configuration,
+    build_navigator,
+    build_scan_filters,
+    set_footprint,
+)
 
 
 class NavigatorHost:
@@ -68,6 +74,10 @@ class NavigatorHost:
         for intake in self.intakes:
             intake.reconfigure()
         self.configuration = configuration
+
+    def set_footprint(self, costmap: LayeredCostmap, footprint: NDArray[np.float64]) -> None:
+        """Give one of the costmaps, and its planner, another unpadded footprint, float64[n, 2]."""
+        set_footprint(self.navigator, self.configuration, costmap, footprint)
 
     def restart(self, now_s: float) -> None:
         """Restart schedules, costmaps and filters after the clock has jumped back."""

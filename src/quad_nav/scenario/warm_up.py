@@ -16,9 +16,11 @@ import numpy as np
 
 from quad_nav import config
 from quad_nav.config.robot_tree import RobotSource, robot_tree
+from quad_nav.control.dwa_planner import DwaPlanner
 from quad_nav.control.trajectory_planner import TrajectoryPlanner
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.scan_filter import ScanFilters, ScanSituation
+from quad_nav.costmap.voxel import VoxelLayer
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import config_names
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
@@ -66,6 +68,11 @@ def warm_up(configuration: config.Configuration) -> None:
     _add_scans(navigator, here)  # again, with the points of a peer to remove
     if isinstance(navigator.controller, TrajectoryPlanner) and navigator.controller.rollout:
         navigator.controller.rollout.score(np.zeros((1, 3)))  # of strafing, the last resort
+    if isinstance(navigator.controller, DwaPlanner):
+        navigator.controller.pop_trajectories()
+    for layer in navigator.local_costmap.layers.values():
+        if isinstance(layer, VoxelLayer):
+            list(layer.clearing_ends())
 
 
 def distinct(configurations: Iterable[config.Configuration]) -> List[config.Configuration]:

@@ -49,6 +49,11 @@ def in_fleet(number: int) -> Names:
     return resolved
 
 
+def topic_below(namespace: str, topic: str) -> str:
+    """Return the name of a topic of a namespace, unless it is absolute."""
+    return topic if topic.startswith("/") else f"{namespace}/{topic}"
+
+
 class CostmapSchedule:
     """Collect the windows that updates of a costmap change until publishing is due.
 
@@ -59,27 +64,45 @@ class CostmapSchedule:
     def __init__(self, costmap: LayeredCostmap) -> None:
         """Start at time 0 with nothing changed and nothing published."""
         self._costmap = costmap
-        self._changed = NO_CELLS
+        self._changed = self._last = NO_CELLS
+        self._has_begun = False
+        self._published_s = 0.0
         self._published: Optional[GridSpec] = None
         self._schedule = Schedule(costmap.params.publish_frequency_hz)
         self.restart(0.0)
 
     def restart(self, now_s: float) -> None:
         """Restart the schedule after a clock jump: publishing is due after one period."""
+        self._published_s = now_s
         self._schedule.start(now_s)
         self._schedule.pop(now_s)
 
-    def add(self, now_s: float, window: Window) -> bool:
-        """Add the window that an update changed.
+    def add(self, now_s: float, window: Optional[Window]) -> bool:
+        """Add the window that an update changed, None if it was not made.
 
         A late update does not delay the following ones.
 
         Returns:
-            True if publishing is due; never with a publish frequency of 0.
+            True if publishing is due; never with a publish frequency of 0, nor before an update.
         """
-        self._changed = self._changed.union(window)
-        self._schedule.set_frequency(self._costmap.params.publish_frequency_hz, now_s)
-        return self._schedule.pop(now_s)
+        params = self._costmap.params
+        self._has_begun = self._has_begun or window is not None
+        if window not in (None, NO_CELLS):
+            self._last = window
+        self._changed = self._changed.union(window or NO_CELLS)
+        if not params.publish_on_time:
+            self._changed = self._changed.union(self._last)
+            return self._has_begun and self._pop_late(now_s, params.publish_frequency_hz)
+        self._schedule.set_frequency(params.publish_frequency_hz, now_s)
+        return self._has_begun and self._schedule.pop(now_s)
+
+    def _pop_late(self, now_s: float, frequency_hz: float) -> bool:
+        """Return whether more than a period has passed, in whole nanoseconds as in ROS."""
+        passed_ns = round((now_s - self._published_s) * 1e9)
+        if frequency_hz <= 0.0 or passed_ns <= round(1e9 / frequency_hz):
+            return False
+        self._published_s = now_s
+        return True
 
     def pop(self) -> Window:
         """Return the window that has changed since the last call."""

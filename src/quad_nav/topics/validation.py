@@ -21,6 +21,7 @@ from quad_nav.sim.contacts import Contact
 MAX_BEAMS = 100_000
 MAX_POINTS = 1_000_000
 MAX_POSES = 100_000
+MAX_CORNERS = 1_000
 MAX_CELLS = 10**8
 MAX_TIME_S = 2.0**32
 """End of the range of ROS times."""
@@ -91,6 +92,15 @@ def scan_problem(scan: Scan) -> str:
             f"ranges from {scan.range_min_m:g} to {scan.range_max_m:g} m, expected range_min from 0"
             " to less than range_max"
         )
+    return ""
+
+
+def footprint_problem(points: NDArray[np.float64]) -> str:
+    """Check that a footprint, float64[n, 2] in metres, is a polygon of finite points."""
+    if not 3 <= len(points) <= MAX_CORNERS:
+        return f"{len(points)} points, expected 3 to {MAX_CORNERS}"
+    if not (np.abs(points) <= MAX_MAGNITUDE).all():
+        return f"coordinates that are not finite or beyond {MAX_MAGNITUDE:g} m"
     return ""
 
 

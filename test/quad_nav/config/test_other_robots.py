@@ -104,6 +104,13 @@ def test_a_configuration_of_quadcopters_stays_as_it_is():
         assert "body_radius" not in tree and lines(tree) == {}
 
 
+def test_odometry_of_another_robot_is_that_of_the_quadcopter(robot):
+    robot["DWAPlannerROS"] = {"odom_topic": "odometry/filtered"}
+    tree = fitted(robot, 3)
+    assert tree["DWAPlannerROS"]["odom_topic"] == "/odom3"
+    assert any("odometry/filtered is /odom{i}" in remark.text for remark in tree.remarks)
+
+
 def test_frames_of_another_quadcopter_are_a_fault(robot):
     robot["global_costmap"]["global_frame"] = "odom4"
     faults = list(input_faults(load(fitted(robot, 3)).costmaps, 3))

@@ -118,6 +118,35 @@ def test_cost_cloud_holds_the_cells_a_robot_could_be_in():
     assert row[6] == pytest.approx(0.05 * (0.6 * 58 + 0.8 * 87) + 0.01 * 100)
 
 
+def test_trajectories_have_the_cost_that_upstream_has_added_up():
+    """Three samples of two poses: they turn by -0.4, 0 and 0.4 rad/s, which costs 0.4, 0, 0.4.
+
+    Obstacles cost 10 each. Only the last trajectory, turned left by 0.2 rad at x = 0.1, has a
+    corner in the cell of cost 50, and its turn is no longer added.
+    """
+    params = replace(
+        PARAMS,
+        **{"min_vel_x_mps": 0.2, "max_vel_x_mps": 0.2, "max_vel_theta_radps": 0.4},
+        **{"sim_time_s": 1.0, "sim_granularity_m": 0.15, "angular_sim_granularity_rad": 0.25},
+        **{"path_distance_bias": 0.0, "goal_distance_bias": 0.0, "vth_samples": 3},
+        **{"occdist_scale": 1.0, "twirling_scale": 1.0},
+    )
+    costs = free() + np.uint8(10)
+    costs[27, 36] = 50
+    planner = DwaPlanner(params, 0.95 * np.asarray(SQUARE), PERIOD_S)
+    assert planner.pop_trajectories() is None
+    planner.set_plan(line(0.0, 0.0, 4.0, 0.0))
+    planner.compute_velocity(WINDOW, costs, ORIGIN, Twist2D(0.2))
+
+    points = planner.pop_trajectories()
+
+    np.testing.assert_allclose(points[:, 0], [0.0, 0.1] * 3, atol=1e-6)
+    assert not points[:, 1:3].any()
+    np.testing.assert_allclose(points[:, 3], [0.0, -0.2, 0.0, 0.0, 0.0, 0.2], atol=1e-6)
+    np.testing.assert_allclose(points[:, 4], [10.4, 10.4, 10.0, 10.0, 50.0, 50.0], atol=1e-5)
+    assert planner.pop_trajectories() is None
+
+
 @pytest.mark.parametrize(
     "pose, restricted",
     [

@@ -57,6 +57,20 @@ def row(layer):
     return picture(layer.grid.costs[ROW : ROW + 1])
 
 
+def test_voxels_and_ends_of_rays_as_costmap_2d_publishes_them():
+    """One ray ends two cells before its point, the other one in the middle of the last cell."""
+    layer = layer_of()
+    see(layer, (4.5, 0.5), (9.5, 0.5))
+    packed = layer.packed_voxels()
+    assert packed.dtype == np.uint32 and packed[0, 0] == 0xFFFF  # unknown
+    assert [hex(column) for column in packed[ROW, [0, 4]]] == ["0xfffe", "0x1ffff"]
+    ((stamp_s, ends),) = layer.clearing_ends()
+    assert stamp_s == 0.0
+    np.testing.assert_allclose(ends, [(2.5, 2.5, 0.5), (5.5, 2.5, 0.5)])
+    see(layer, (4.5, 0.5), eye=(0.5, 2.5, 5.0))  # a sensor above the voxels clears nothing
+    assert list(layer.clearing_ends()) == []
+
+
 def test_a_ray_clears_until_two_cells_before_the_voxel_that_is_marked():
     layer = layer_of()
     see(layer, (4.5, 0.5))

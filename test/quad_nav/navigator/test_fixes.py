@@ -13,7 +13,7 @@ from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.tick import RobotPoses
 from quad_nav.peers.peer_params import PeerParams
 from quad_nav.recovery import RecoveryContext
-from quad_nav.scenario.assembly import build_navigator
+from quad_nav.scenario.assembly import build_navigator, set_footprint
 
 LIDAR = {
     "data_type": "LaserScan",
@@ -158,3 +158,13 @@ def test_sensor_timeout_limits_the_expected_update_rate(tree, stale_after_s):
     see_a_wall_three_metres_ahead(navigator, 10.0)
     assert navigator.local_costmap.is_current(10.0 + stale_after_s)
     assert not navigator.local_costmap.is_current(10.1 + stale_after_s)
+
+
+@pytest.mark.parametrize("tree, reach_m", [({}, 1.01), (UPSTREAM, 0.47)])
+def test_trajectory_planner_follows_the_footprint_in_force(tree, reach_m):
+    """Upstream's keeps the one of its start, here of the default radius 0.46 m and padding."""
+    configuration = load(tree)
+    navigator = build_navigator(configuration)
+    square = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
+    set_footprint(navigator, configuration, navigator.local_costmap, square)
+    assert np.abs(navigator.controller.footprint).max() == pytest.approx(reach_m)

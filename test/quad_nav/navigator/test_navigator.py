@@ -10,7 +10,7 @@ import pytest
 from upstream import UPSTREAM
 
 from quad_nav.config import load
-from quad_nav.errors import NoPath, NoValidTrajectory
+from quad_nav.errors import GoalOutsideMap, NoPath, NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
 from quad_nav.navigator.command_filter import VoronoiCell
@@ -56,13 +56,13 @@ class FakeCostmap:
 
 class FakePlanner:
     def __init__(self):
-        self.fails = False
+        self.fails, self.error = False, NoPath("walled in")
         self.calls = 0
 
     def make_plan(self, spec, costs, start, goal):
         self.calls += 1
         if self.fails:
-            raise NoPath("walled in")
+            raise self.error
         return np.array([[start.x_m, start.y_m, 0.0], [goal.x_m, goal.y_m, goal.yaw_rad]])
 
 
@@ -288,8 +288,14 @@ def test_shutdown_costmaps_skips_updates_without_a_goal():
     flight = Flight(shutdown_costmaps=True)
     flight.until(2.0)
     assert flight.global_costmap.updates == []
-    flight.navigator.set_goal(GOAL, flight.now_s)
-    flight.until(4.0)
+    ticks = flight.until(3.1)
+    times = [tick.now_s for tick in ticks if "local" in tick.windows]
+    assert times == pytest.approx([2.25, 2.5, 2.75, 3.0])  # what was not sent yet can go out
+    assert all(window is None for tick in ticks for window in tick.windows.values())
+    begin_s = flight.now_s
+    flight.navigator.set_goal(GOAL, begin_s)
+    flight.until(5.0)
+    assert flight.global_costmap.updates[0] == begin_s  # before the first plan
     assert len(flight.global_costmap.updates) >= 5
 
 
@@ -374,3 +380,14 @@ def test_upstream_recovers_when_its_pose_is_lost(tree, recovers):
     assert any(tick.recovery for tick in ticks) is recovers
     before = [tick.command for tick in ticks if not tick.recovery and tick.command]
     assert set(before) == {Twist2D()}
+
+
+@pytest.mark.parametrize(
+    "error, searched", [(NoPath("walled in"), True), (GoalOutsideMap("far away"), False)]
+)
+def test_a_goal_outside_of_the_map_is_not_searched_for(error, searched):
+    flight = Flight()
+    flight.planner.fails, flight.planner.error = True, error
+    flight.navigator.set_goal(GOAL, 0.0)
+    failed = [tick for tick in flight.until(0.5) if tick.planning_failed]
+    assert failed and {tick.no_path for tick in failed} == {searched}

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
 
 rospy = pytest.importorskip("rospy")
 
-from ros.fake_ros import FakeRos, deliver  # noqa: E402
+from geometry_msgs.msg import Point32, Polygon  # noqa: E402
+from nav_msgs.msg import Odometry  # noqa: E402
+from ros.fake_ros import FakePublisher, FakeRos, deliver  # noqa: E402
 from tf2_msgs.msg import TFMessage  # noqa: E402
 
 from quad_nav import config  # noqa: E402
-from quad_nav.geometry import Pose3D  # noqa: E402
+from quad_nav.geometry import Pose3D, Twist2D  # noqa: E402
 from quad_nav.ros.common import conversions  # noqa: E402
 from quad_nav.ros.navigator.nodes import Fleet  # noqa: E402
 from quad_nav.topics.publishing import own_node  # noqa: E402
@@ -88,3 +91,72 @@ def test_it_stops_without_odometry_that_has_never_come_or_not_since_a_clock_jump
     robot.restart(0.8)
     assert located(0.8).in_global is not None
     assert located(1.4).unknown_reason == "no message on /odom for 0.6 s"
+
+
+def test_dwa_planner_can_hear_odometry_of_another_name(ros):
+    tree = config.load_files(ROOT / "config" / "default", {"i": "0"})
+    tree.update(robot=0, robots=1, base_local_planner="dwa_local_planner/DWAPlannerROS")
+    tree["DWAPlannerROS"] = {"odom_topic": "odometry/filtered"}
+    robot = Fleet({0: config.load(tree)}, lambda _: own_node).robots[0]
+    message = Odometry()
+    message.header.frame_id, message.pose.pose.orientation.w = "odom0", 1.0
+    message.twist.twist.linear.x = 0.25
+    deliver("/odometry/filtered", message)
+    assert robot._velocity == Twist2D(0.25)
+
+
+ARM = [(0.5, 0.25), (-0.25, 0.25), (-0.25, -0.25), (0.5, -0.25)]
+
+
+def local_footprint():
+    return rospy.resolve_name("~local_costmap/footprint")
+
+
+def polygon(points):
+    return Polygon([Point32(x, y, 0.0) for x, y in points])
+
+
+def test_a_footprint_from_its_topic_decides_costs_and_commands(ros, robot):
+    """Padding, a float32 of 0.01 m, is added; each costmap has a topic of its own."""
+    radius_m = robot.costmaps[0].inscribed_radius_m
+    deliver(local_footprint(), polygon(ARM))
+    step(ros, robot, 1.0)
+    local = robot.navigator.local_costmap
+    assert local.inscribed_radius_m == pytest.approx(0.26)
+    assert local.layers["inflation_layer"]._inscribed_radius_m == local.inscribed_radius_m
+    assert robot.navigator.controller.footprint[0] == pytest.approx((0.51, 0.26))
+    assert robot.costmaps[0].inscribed_radius_m == radius_m
+    tree = config.updated(robot.configuration, "local_costmap", {"footprint_padding": 0.0})
+    robot.reconfigure(tree)
+    assert local.inscribed_radius_m == 0.25  # another parameter leaves the outline alone
+    robot.reconfigure(config.updated(tree, "local_costmap", {"robot_radius": 0.5}))
+    assert local.inscribed_radius_m == pytest.approx(0.4904, abs=1e-4)  # 0.5 cos(pi / 16)
+
+
+@pytest.mark.parametrize(
+    "points, reason",
+    [
+        (ARM[:2], "2 points, expected 3 to 1000"),
+        ([*ARM[:3], (math.nan, 0.0)], "coordinates that are not finite or beyond 1e+06 m"),
+        ([*ARM[:3], (1e7, 0.0)], "coordinates that are not finite or beyond 1e+06 m"),
+    ],
+)
+def test_a_footprint_that_is_none_is_dropped(ros, robot, points, reason):
+    before = robot.navigator.local_costmap.footprint
+    deliver(local_footprint(), polygon(points))
+    step(ros, robot, 1.0)
+    assert robot.navigator.local_costmap.footprint is before
+    assert ros.log.lines == [f"quad0: {local_footprint()}: footprint dropped: {reason}"]
+
+
+def test_topics_of_footprints_can_have_other_names(ros):
+    """Upstream looks for them upwards, to the node's level."""
+    tree = config.load_files(ROOT / "config" / "default", {"i": "0"})
+    tree.update(robot=0, robots=1, footprint_topic="/arm/outline")
+    tree["global_costmap"]["published_footprint_topic"] = "placed"
+    robot = Fleet({0: config.load(tree)}, lambda _: own_node).robots[0]
+    deliver("/arm/outline", polygon(ARM))
+    step(ros, robot, 1.0)
+    assert {round(costmap.inscribed_radius_m, 6) for costmap in robot.costmaps} == {0.26}
+    placed = rospy.resolve_name("~global_costmap/placed")
+    assert {placed, local_footprint()} <= set(FakePublisher.all)

@@ -143,6 +143,16 @@ def test_windows_add_up_between_two_publications():
     assert not CostmapSchedule(costmap(publish_frequency_hz=0.0)).add(9.0, Window(0, 2, 0, 2))
 
 
+def test_as_upstream_more_than_a_period_lies_between_two_publications():
+    """2 Hz of updates at 4 Hz come every 0.75 s; without an update the last window comes again."""
+    schedule = CostmapSchedule(costmap(publish_frequency_hz=2.0, publish_on_time=False))
+    assert not schedule.add(0.75, None)  # before the first update
+    times = [1.0 + 0.25 * k for k in range(8)]
+    assert [now_s for now_s in times if schedule.add(now_s, Window(0, 2, 0, 2))] == [1, 1.75, 2.5]
+    schedule.pop()
+    assert schedule.add(3.25, None) and schedule.pop() == Window(0, 2, 0, 2)
+
+
 def test_publishing_is_due_one_period_after_a_clock_jump():
     schedule = CostmapSchedule(costmap(publish_frequency_hz=1.0))
     assert schedule.add(100.0, NO_CELLS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Sequence
 
 import numpy as np
 import rospy
@@ -126,26 +127,32 @@ def update_message(
     return OccupancyGridUpdate(Header(0, stamp, frame), x0, y0, width, height, data)
 
 
-CLOUD_FIELDS = ("x", "y", "z", "path_cost", "goal_cost", "occ_cost", "total_cost")
+COST_FIELDS = ("x", "y", "z", "path_cost", "goal_cost", "occ_cost", "total_cost")
 
 
 def cost_cloud_message(
     points: np.ndarray, cells: int, frame: str, stamp: rospy.Time
 ) -> PointCloud2:
-    """Convert the scored cells of a local planner, float32[n, 7] in columns of `CLOUD_FIELDS`.
+    """Convert the scored cells of a local planner, float32[n, 7] in columns of `COST_FIELDS`.
 
     As in C++ move_base, the cloud has one point for each of the ``cells`` of the window, the scored
     ones first. Points without a score are NaN; viewers skip them.
     """
-    data = np.full((cells, len(CLOUD_FIELDS)), np.nan, dtype=np.float32)
+    data = np.full((cells, len(COST_FIELDS)), np.nan, dtype=np.float32)
     data[: len(points)] = points
-    fields = [PointField(name, 4 * k, PointField.FLOAT32, 1) for k, name in enumerate(CLOUD_FIELDS)]
+    return cloud_message(data, COST_FIELDS, frame, stamp)
+
+
+def cloud_message(
+    points: np.ndarray, fields: Sequence[str], frame: str, stamp: rospy.Time
+) -> PointCloud2:
+    """Convert points, float32[n, k] with a column for each of the ``fields``."""
     return PointCloud2(
         header=Header(0, stamp, frame),
         height=1,
-        width=cells,
-        fields=fields,
-        point_step=data.strides[0],
-        row_step=data.nbytes,
-        data=data.tobytes(),
+        width=len(points),
+        fields=[PointField(name, 4 * k, PointField.FLOAT32, 1) for k, name in enumerate(fields)],
+        point_step=4 * len(fields),
+        row_step=points.nbytes,
+        data=points.tobytes(),
     )

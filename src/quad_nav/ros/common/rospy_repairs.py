@@ -84,6 +84,13 @@ def ignore_publishers(is_ignored: Callable[[str, str], bool]) -> None:
     _SubscriberImpl.has_connection = has_connection
 
 
+def ignore_own_publisher(subscriber: rospy.Subscriber) -> None:
+    """Let a subscriber not connect to a publisher of this process that is made after it."""
+    is_connected = subscriber.impl.has_connection
+    own = rospy.get_node_uri()
+    subscriber.impl.has_connection = lambda address: address == own or is_connected(address)
+
+
 def sender_of(message: Any) -> str:
     """Return the name of the node that sent a message; "" if its connection does not say."""
     return str(message._connection_header.get("callerid", ""))

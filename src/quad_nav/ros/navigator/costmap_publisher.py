@@ -1,4 +1,4 @@
-"""Publish a costmap: the full grid, its updates, the footprint and marked voxels.
+"""Publish a costmap: the full grid, its updates, the footprint and the voxels.
 
 The rules are those of costmap_2d: publish only for subscribers; follow the schedule of
 `CostmapSchedule`; send each new subscriber one full grid, also with a publish frequency of 0.
@@ -7,14 +7,12 @@ The rules are those of costmap_2d: publish only for subscribers; follow the sche
 from __future__ import annotations
 
 import threading
-from typing import Any, Callable
+from typing import Any, Callable, Optional
 
 import rospy
-from geometry_msgs.msg import Point, PolygonStamped, Vector3
+from geometry_msgs.msg import PolygonStamped
 from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid
-from std_msgs.msg import ColorRGBA
-from visualization_msgs.msg import Marker
 
 from quad_nav.costmap.cost_grid import Window
 from quad_nav.costmap.layered import LayeredCostmap
@@ -23,9 +21,8 @@ from quad_nav.footprint import oriented
 from quad_nav.geometry import Pose2D
 from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.nav_messages import grid_message, polygon_message, update_message
-from quad_nav.topics.publishing import CostmapSchedule, Names
-
-_VOXEL_COLOUR = ColorRGBA(0.8, 0.3, 0.1, 0.6)
+from quad_nav.ros.navigator.voxel_topics import VoxelTopics
+from quad_nav.topics.publishing import CostmapSchedule, Names, topic_below
 
 Publish = Callable[[Any], None]
 """Sends a message to one subscriber or to all."""
@@ -56,7 +53,8 @@ class CostmapPublisher:
         self._lock = lock
         self._schedule = CostmapSchedule(costmap)
         namespace = names(f"~{name}")
-        self._footprint = rospy.Publisher(f"{namespace}/footprint", PolygonStamped, queue_size=1)
+        topic = topic_below(namespace, costmap.params.published_footprint_topic)
+        self._footprint = rospy.Publisher(topic, PolygonStamped, queue_size=1)
         self._updates = rospy.Publisher(
             f"{namespace}/costmap_updates", OccupancyGridUpdate, queue_size=10
         )
@@ -66,39 +64,42 @@ class CostmapPublisher:
             queue_size=1,
             subscriber_listener=NewSubscriber(self._send_full),
         )
-        self._voxels = [  # C++ costmap_2d has a type of its own, and a node that converts it
-            (rospy.Publisher(f"{namespace}/{one}/voxel_markers", Marker, queue_size=1), layer)
-            for one, layer in costmap.layers.items()
-            if isinstance(layer, VoxelLayer) and layer.params.publish_voxel_map
+        self._voxels = [
+            VoxelTopics(f"{namespace}/{layer_name}", layer, costmap.params.global_frame)
+            for layer_name, layer in costmap.layers.items()
+            if isinstance(layer, VoxelLayer)
         ]
 
     def restart(self, now_s: float) -> None:
         """Restart the schedule after a clock jump."""
         self._schedule.restart(now_s)
 
-    def publish(self, now_s: float, pose: Pose2D, window: Window) -> None:
-        """Publish what is due after an update of the costmap.
+    def publish(self, now_s: float, pose: Optional[Pose2D], window: Optional[Window]) -> None:
+        """Publish what is due at the time of an update of the costmap.
 
         Args:
             now_s: Time of the update.
-            pose: Robot pose in the costmap's global frame.
-            window: Window that the update changed.
+            pose: Robot pose in the costmap's global frame, None if unknown.
+            window: Window that the update changed, None if it was not made.
         """
-        params, stamp = self._costmap.params, time_message(now_s)
-        if self._footprint.get_num_connections() > 0:
-            self._footprint.publish(
-                polygon_message(oriented(self._costmap.footprint, pose), params.global_frame, stamp)
-            )
-        for publisher, layer in self._voxels:
-            if publisher.get_num_connections() > 0:
-                publisher.publish(voxel_marker(layer, params.global_frame, stamp))
+        stamp = time_message(now_s)
+        if window is not None and pose is not None:
+            self._publish_update(pose, stamp)
         if self._schedule.add(now_s, window):
             self._publish_grid(stamp)
 
+    def _publish_update(self, pose: Pose2D, stamp: rospy.Time) -> None:
+        costmap, frame = self._costmap, self._costmap.params.global_frame
+        if self._footprint.get_num_connections() > 0:
+            points = oriented(costmap.footprint, pose)
+            self._footprint.publish(polygon_message(points, frame, stamp))
+        for voxels in self._voxels:
+            voxels.publish(stamp)
+
     def _publish_grid(self, stamp: rospy.Time) -> None:
+        if self._grid.get_num_connections() == 0:
+            return  # what changes meanwhile is in the first update
         costmap, changed = self._costmap, self._schedule.pop()
-        if self._grid.get_num_connections() == 0 and self._updates.get_num_connections() == 0:
-            return
         if self._schedule.pop_full_grid():
             self._grid.publish(self._full(stamp))
         elif not changed.is_empty:
@@ -114,20 +115,7 @@ class CostmapPublisher:
     def _send_full(self, send: Publish) -> None:
         with self._lock:
             message = self._full(rospy.Time.now())
+            # The first subscriber has the full grid by this; others may miss one that has moved.
+            if self._grid.get_num_connections() <= 1 or not self._costmap.params.publish_on_time:
+                self._schedule.pop_full_grid()
         send(message)
-
-
-def voxel_marker(layer: VoxelLayer, frame: str, stamp: rospy.Time) -> Marker:
-    """Return the marked voxels as one list of cubes, which replaces the previous one."""
-    resolution_m = layer.grid.spec.resolution_m
-    marker = Marker(
-        type=Marker.CUBE_LIST,
-        action=Marker.ADD,
-        ns="voxels",
-        color=_VOXEL_COLOUR,
-        scale=Vector3(resolution_m, resolution_m, layer.params.z_resolution_m),
-    )
-    marker.header.frame_id, marker.header.stamp = frame, stamp
-    marker.pose.orientation.w = 1.0
-    marker.points = [Point(*centre) for centre in layer.marked_voxels().tolist()]
-    return marker

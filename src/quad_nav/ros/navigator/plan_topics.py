@@ -14,6 +14,7 @@ from sensor_msgs.msg import PointCloud2
 
 from quad_nav.config.plugins import plugin_name
 from quad_nav.control.controller import Control
+from quad_nav.control.dwa_planner import DwaPlanner
 from quad_nav.geometry import Pose3D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import Tick
@@ -21,6 +22,7 @@ from quad_nav.plan.global_planner import SearchPlanner
 from quad_nav.plan.navfn import Navfn
 from quad_nav.ros.common.conversions import time_message, twist_message
 from quad_nav.ros.common.nav_messages import (
+    cloud_message,
     cost_cloud_message,
     path_message,
     pose_stamped,
@@ -29,6 +31,8 @@ from quad_nav.ros.common.nav_messages import (
 from quad_nav.ros.common.own_messages import stamped
 from quad_nav.topics.publishing import Names
 from quad_nav.topics.robot_topics import ROBOT_TOPICS, RobotTopicSchedule
+
+_TRAJECTORY = ("x", "y", "z", "theta", "cost")
 
 
 class PlanTopics:
@@ -71,6 +75,8 @@ class PlanTopics:
         self._global_plan = self._advertise(f"{controller}/global_plan", Path)
         self._local_plan = self._advertise(f"{controller}/local_plan", Path)
         self._cost_cloud = self._advertise(f"{controller}/cost_cloud", PointCloud2)
+        if isinstance(self._navigator.controller, DwaPlanner):
+            self._trajectory_cloud = self._advertise(f"{controller}/trajectory_cloud", PointCloud2)
         for publisher in before:
             publisher.unregister()
 
@@ -89,9 +95,9 @@ class PlanTopics:
             self._command.publish(twist_message(tick.command))
         if tick.plan is not None:
             self.publish_plan(tick.plan, now)
-        if tick.planning_failed:
+        if tick.no_path:
             self.publish_no_plan(now)
-        if tick.plan is not None or tick.planning_failed:
+        if tick.plan is not None or tick.no_path:
             self._publish_potential(now)
         if tick.recovery is not None:
             self._recovery.publish(
@@ -104,6 +110,8 @@ class PlanTopics:
             )
         if tick.control is not None:
             self._publish_control(tick.control, now)
+        if tick.cycle:
+            self._publish_trajectories(now)
 
     def publish_plan(self, plan: np.ndarray, now: rospy.Time) -> None:
         """Publish a plan.
@@ -157,6 +165,19 @@ class PlanTopics:
                 spec = self._navigator.local_costmap.spec
                 cells = spec.size_x * spec.size_y
                 self._cost_cloud.publish(cost_cloud_message(points, cells, self._local_frame, now))
+
+    def _publish_trajectories(self, now: rospy.Time) -> None:
+        controller = self._navigator.controller
+        if (
+            isinstance(controller, DwaPlanner)
+            and controller.params.publish_traj_pc
+            and self._trajectory_cloud.get_num_connections() > 0
+        ):
+            points, params = controller.pop_trajectories(), controller.params
+            own, upstream = self._local_frame, params.global_frame_id
+            frame = own if params.stamp_frame_of_costmap else upstream
+            if points is not None:
+                self._trajectory_cloud.publish(cloud_message(points, _TRAJECTORY, frame, now))
 
     def stop(self) -> None:
         """Publish a zero velocity."""

@@ -86,7 +86,7 @@ def _warn(problem: str, number: int) -> None:
 
 def _names(configuration: Configuration) -> Dict[str, List[str]]:
     """Return the names that may have the robot's number, those that count most first."""
-    costmaps = configuration.costmaps.values()
+    costmaps, odom = configuration.costmaps.values(), configuration.odom_topic
     sensors = [
         source.topic or source.name
         for costmap in costmaps
@@ -96,5 +96,5 @@ def _names(configuration: Configuration) -> Dict[str, List[str]]:
     return {
         "node's name": [rospy.get_name()],
         "frames": [costmap.robot_base_frame for costmap in costmaps],
-        "topics": [rospy.resolve_name(name) for name in ("odom", "cmd_vel", *sensors)],
+        "topics": [rospy.resolve_name(name) for name in (odom, "cmd_vel", *sensors)],
     }

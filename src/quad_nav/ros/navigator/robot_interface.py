@@ -21,6 +21,7 @@ from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import LocatedPose, Transforms
 from quad_nav.ros.navigator import static_maps
 from quad_nav.ros.navigator.costmap_publisher import CostmapPublisher
+from quad_nav.ros.navigator.footprint_topic import FootprintTopic
 from quad_nav.ros.navigator.goal_server import GoalServer
 from quad_nav.ros.navigator.health_meters import InputMeter, NavigatorHealth
 from quad_nav.ros.navigator.obstacle_topics import ObstacleTopics
@@ -59,6 +60,10 @@ class RobotInterface:
         self.warnings = ThrottledWarnings()
         self.on_request: Callable[[], None] = lambda: None
         self._host, self._navigator = host, host.navigator
+        self._footprints = [
+            FootprintTopic(self.name, name, costmap, names)
+            for name, costmap in zip(("global_costmap", "local_costmap"), host.costmaps)
+        ]
         self._publishers = {
             name: CostmapPublisher(f"{name}_costmap", costmap, self.lock, names)
             for name, costmap in zip(("global", "local"), host.costmaps)
@@ -110,7 +115,11 @@ class RobotInterface:
         self._parameters.change_planners(configuration)
 
     def poll(self, now_s: float) -> None:
-        """Pass a waiting goal or cancel request to the navigator, if it accepts one now."""
+        """Take waiting footprints; pass a goal or cancel request on, if one is accepted now."""
+        for topic in self._footprints:
+            footprint = topic.pop()
+            if footprint is not None:
+                self._host.set_footprint(topic.costmap, footprint)
         self._goals.poll(self._navigator, now_s)
 
     def restart(self, now_s: float) -> None:
@@ -152,9 +161,7 @@ class RobotInterface:
         self._obstacles.publish(tick.now_s)
         poses = {"global": located.in_global, "local": located.in_local}
         for name, window in tick.windows.items():
-            pose = poses[name]
-            assert pose is not None  # a costmap is updated at a known pose only
-            self._publishers[name].publish(tick.now_s, pose, window)
+            self._publishers[name].publish(tick.now_s, poses[name], window)
         self._goals.finish(tick.outcome)
 
     def _log(self, tick: Tick) -> None:

@@ -61,8 +61,9 @@ class RobotNavigator(NavigatorHost):
         self._last_pose: Optional[LocatedPose] = None
         self._transforms, self._peers = transforms, peers
         self._warnings = ThrottledWarnings()
-        self._odometry_meter = InputMeter(rospy.resolve_name(names("odom")))
-        self._odometry = rospy.Subscriber(names("odom"), Odometry, self._on_odometry, queue_size=1)
+        topic = names(configuration.odom_topic)
+        self._odometry_meter = InputMeter(rospy.resolve_name(topic))
+        self._odometry = rospy.Subscriber(topic, Odometry, self._on_odometry, queue_size=1)
         self._sensors = sensors.connect(self, names)
         self._interface = RobotInterface(
             self,
