@@ -8,9 +8,13 @@ import pytest
 from click.testing import CliRunner
 
 from quad_nav.cli import main
+from quad_nav.config.check import check_source
+from quad_nav.config.configuration import load
 from quad_nav.config.robot_tree import RobotSource, robot_tree
 from quad_nav.config.sources import robot_set
 from quad_nav.config.substitution import Substitution, Unresolved
+from quad_nav.files.shipped import shipped
+from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 
 CASES = Path(__file__).parents[2] / "field_cases"
 
@@ -110,3 +114,81 @@ def test_the_value_of_an_argument_in_yaml(monkeypatch):
     result = CliRunner().invoke(main, ["check", "arg_in_yaml"])
     assert "add :scan_topic=VALUE" in " ".join(result.output.split())
     assert CliRunner().invoke(main, ["check", "arg_in_yaml:scan_topic=scan"]).exit_code == 0
+
+
+TEB = """\
+max_vel_x: 0.4
+max_vel_x_backwards: 0.2
+max_vel_theta: 0.8
+acc_lim_x: 0.5
+xy_goal_tolerance: 0.15
+footprint_model: {type: circular, radius: 0.2}
+"""
+EBAND = "{max_vel_lin: 0.6, max_vel_th: 1.5, max_acceleration: 0.3}"
+
+
+def planner_of(tmp_path, text):
+    (tmp_path / "robot.yaml").write_text(text)
+    configuration = load(robot_tree(RobotSource(str(tmp_path / "robot.yaml"), 0)))
+    return configuration, " ".join(map(str, configuration.remarks))
+
+
+def test_dwa_flies_with_the_limits_of_a_planner_that_is_not_here(tmp_path):
+    lines = TEB.replace("\n", "\n  ").rstrip(" ")
+    found, told = planner_of(tmp_path, f"TebLocalPlannerROS:\n  {lines}")
+    planner = found.local_planner
+    assert (planner.max_vel_x_mps, planner.max_vel_trans_mps) == (0.4, 0.4)
+    assert (planner.max_vel_theta_radps, planner.acc_lim_x_mps2) == (0.8, 0.5)
+    assert (planner.max_vel_y_mps, planner.min_vel_y_mps, planner.vy_samples) == (0.0, 0.0, 1)
+    assert found.local_costmap.robot_radius_m == found.body_radius_m == 0.2
+    assert "TebLocalPlannerROS is not here: dwa_local_planner/DWAPlannerROS flies with" in told
+    assert "without max_vel_x_backwards, footprint_model" in told
+
+
+def test_names_of_other_planners_and_ones_own_parameters(tmp_path):
+    name = "base_local_planner: eband_local_planner/EBandPlannerROS"
+    planner = planner_of(tmp_path, f"{name}\nEBandPlannerROS: {EBAND}")[0].local_planner
+    assert (planner.max_vel_x_mps, planner.max_vel_theta_radps) == (0.6, 1.5)
+    own = f"{name}\nEBandPlannerROS: {EBAND}\nDWAPlannerROS: {{max_vel_x: 0.2}}"
+    assert planner_of(tmp_path, own)[0].local_planner.max_vel_x_mps == 0.2
+
+
+def cautions_of(source):
+    ((report,), _) = check_source(str(source))
+    return " ".join(str(one) for one in report.lines if one.kind == "caution")
+
+
+@pytest.mark.parametrize(
+    "case, caution",
+    [
+        ("inflation_small/cfg", "0.2 m is below the inscribed radius of 0.4 m"),
+        ("slow_control/cfg", "a command is flown for 10 s, which is 3.0 m"),
+    ],
+)
+def test_what_may_let_a_robot_touch_something_is_told(case, caution):
+    assert caution in cautions_of(CASES / case)
+
+
+@pytest.mark.parametrize(
+    "parameters, caution",
+    [
+        (
+            "local_costmap: {static_map: true, observation_sources: ''}",
+            "sees nothing but the map",
+        ),
+        (
+            "TrajectoryPlannerROS: {max_vel_x: 1.0, max_vel_theta: 0.1, holonomic_robot: false}",
+            "turns with a radius of 10.0 m",
+        ),
+        ("base_global_planner: carrot_planner/CarrotPlanner", "CarrotPlanner flies straight on"),
+    ],
+)
+def test_cautions_on_planners_and_costmaps(tmp_path, parameters, caution):
+    (tmp_path / "robot.yaml").write_text(parameters)
+    assert caution in cautions_of(tmp_path / "robot.yaml")
+
+
+def test_a_footprint_smaller_than_the_body_is_told_at_take_off(tmp_path):
+    options = {"config": "default", "parameters": (("local_costmap/robot_radius", 0.2),)}
+    setup = read_setup(FlightOptions(None, shipped("goals"), robots=1, **options))
+    assert "inscribed radius of 0.20 m, the body 0.3 m" in " ".join(setup.warnings)
