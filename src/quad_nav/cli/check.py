@@ -12,6 +12,7 @@ import click
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_SUCCESS
 from quad_nav.cli.options import echo, echo_lines
 from quad_nav.config.check import Report, check_files, check_source, counts, report_text
+from quad_nav.config.files import COSTMAPS
 from quad_nav.config.launch_file import is_launch_file
 from quad_nav.config.sources import label, placed_file, split_source
 from quad_nav.errors import InputError
@@ -71,7 +72,7 @@ def _is_source(word: str) -> bool:
         split_source(word)
     except InputError:
         return False
-    return "=" not in word.partition("/")[0]
+    return word.partition("=")[0] not in COSTMAPS
 
 
 def _choices(source: str, reports: Sequence[Report]) -> List[str]:
@@ -79,7 +80,7 @@ def _choices(source: str, reports: Sequence[Report]) -> List[str]:
     path, _ = split_source(source)
     labels = dict.fromkeys(label(one.files, path) for one in reports)
     robots = {one.files.folder for one in reports if one.files.name.startswith("robot ")}
-    if len(labels) < 2 or robots == {path}:
+    if len(labels) < 2 or robots == {path} or is_launch_file(path):
         return []
     return [f"{path}:{one}" if one else str(path) for one in labels]
 

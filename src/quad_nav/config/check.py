@@ -209,7 +209,7 @@ def _merged(lines: Sequence[Remark]) -> List[Remark]:
 
 def _title(files: FileSet) -> str:
     if files.folder is None:
-        return f"{len(files.files)} file{'s' * (len(files.files) != 1)}"
+        return files.name or f"{len(files.files)} file{'s' * (len(files.files) != 1)}"
     return f"{files.folder}, {files.name}" if files.name else str(files.folder)
 
 

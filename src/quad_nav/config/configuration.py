@@ -6,12 +6,12 @@ import copy
 from dataclasses import dataclass, field, replace
 from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 
+from quad_nav.config.cautions import cautions
 from quad_nav.config.costmaps import (
     COSTMAP_TABLE,
     FOOTPRINT_KEYS,
     costmap_params,
     normalise_costmap,
-    remark_on_blindness,
 )
 from quad_nav.config.files import COSTMAPS, below
 from quad_nav.config.filters import (
@@ -181,8 +181,9 @@ def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
     notes.raise_problems()
 
     configuration = _made(normalised, listed, tree)
-    for name in COSTMAPS:
-        remark_on_blindness(getattr(configuration, name), name, notes)
+    found = cautions(configuration.navigator, configuration.local_planner, configuration.costmaps)
+    for place, text in found:
+        notes.remark(place, CAUTION, text)
     _remark_on_rates(normalised, notes)
     for name, problem in workload_problems(configuration):
         notes.problem(name, problem)

@@ -13,12 +13,10 @@ from typing import Any, Dict, List, Mapping, Set, Tuple
 
 from quad_nav.config.fixes import with_fixes
 from quad_nav.config.layers import LAYERS, PARENT_PARAMETERS, layer_params, normalise_layer
-from quad_nav.config.notes import CAUTION, IGNORED, UNSUPPORTED, Notes, join
-from quad_nav.config.plugins import PluginLayerParams, is_dotted
+from quad_nav.config.notes import IGNORED, UNSUPPORTED, Notes, join
+from quad_nav.config.plugins import is_dotted
 from quad_nav.config.reader import Namespace, Table, made, named_types, normalise, subtree
 from quad_nav.costmap.layered import CostmapParams
-from quad_nav.costmap.obstacle import ObstacleLayerParams
-from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.files.number_texts import polygon_from_list, text_from_polygon
 
 COSTMAP_TABLE = Table((CostmapParams,))
@@ -68,18 +66,6 @@ def costmap_params(tree: Mapping[str, Any], name: str) -> CostmapParams:
         if params is not None:
             layers.append((plugin["name"], with_fixes(params, tree)))
     return with_fixes(made(CostmapParams, costmap, layers=tuple(layers)), tree)
-
-
-def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:
-    """Add a remark on a costmap that no layer writes obstacles to."""
-    if not any(
-        isinstance(layer, (StaticLayerParams, PluginLayerParams))
-        or isinstance(layer, ObstacleLayerParams)
-        and layer.sources
-        for _, layer in params.layers
-    ):
-        text = "no map and no observation_sources: this costmap never has obstacles"
-        notes.remark(name, CAUTION, text)
 
 
 def _normalise_footprint(costmap: Namespace, name: str, tree: Namespace, notes: Notes) -> None:

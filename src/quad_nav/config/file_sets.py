@@ -57,6 +57,7 @@ _OF_COSTMAP_ONLY = {
 }
 _OF_ONE_COSTMAP = {"rolling_window", "static_map", "global_frame", "width"}
 _NUMBERED = re.compile(f"(?:{'|'.join(REQUIRED + OPTIONAL)}|robot)([0-9]+)")
+_OF_LAUNCH_FILES = re.compile(rf"(?:{'|'.join(REQUIRED + OPTIONAL)})[0-9]*\.yaml|robot[0-9]+\.yaml")
 
 # A kind is (order of loading, its costmaps, the keys of a file of the node).
 _COMMON, _ONE_COSTMAP, _NODE = 0, 1, 2
@@ -160,13 +161,29 @@ def _folders(top: Path, only: Optional[Path]) -> List[Tuple[Path, List[Path]]]:
 
 
 def is_standard(folder: Path, number: str) -> bool:
-    """True for a folder with the four files of the launch files, or with a robot's own of them."""
+    """True for a folder with the four files of the launch files, or with a robot's own of them.
+
+    One that has parameters of move_base in files of other names, too, is none: launch files load
+    those beside the four.
+    """
+    if _has_others(folder, number):
+        return False
     if _numbers(folder):
         return True
     try:
         return bool(files_of(folder, number))
     except InputError:
         return False
+
+
+def _has_others(folder: Path, number: str) -> bool:
+    """Tell whether a file that is not one of the launch files has parameters of move_base."""
+    return any(
+        _placed(path, number) is not None
+        for pattern in ("*.yaml", "*.yml")
+        for path in folder.glob(pattern)
+        if not _OF_LAUNCH_FILES.fullmatch(path.name) and not path.name.startswith(".")
+    )
 
 
 def standard_set(folder: Path, number: str, name: str = "") -> FileSet:
@@ -185,6 +202,8 @@ def _numbers(folder: Path) -> List[str]:
 
 
 def _standard_sets(folder: Path, number: Optional[str]) -> List[FileSet]:
+    if _has_others(folder, number or "0"):
+        return []
     numbers = _numbers(folder)
     sets = []
     for one in [number] if number is not None else numbers or ["0"]:

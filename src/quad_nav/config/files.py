@@ -269,6 +269,8 @@ def _substituted(text: str, path: Path, arguments: Mapping[str, str]) -> str:
             return match.group(0)
         line = text.count("\n", 0, match.start()) + 1
         known = ", ".join(f"$(arg {name})" for name in arguments) or "no $( )"
+        if len(words) == 2 and words[0] == "arg":
+            known += f", or a value: add :{words[1]}=VALUE after the name of the folder"
         problems.append(f"{path}:{line}: unknown {match.group(0)}; expected {known}")
         return match.group(0)
 

@@ -7,14 +7,15 @@ What cannot be resolved is a remark if the parameters can be complete without it
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Sequence, Tuple
+from typing import Any, Dict, Iterable, List, Mapping, Sequence, Tuple
 
 import yaml
 
 from quad_nav.config.files import ParameterTree, merge_tree, parsed, set_value
-from quad_nav.config.notes import CAUTION, Remark
+from quad_nav.config.notes import CAUTION, MAPPED, Remark
 from quad_nav.config.substitution import Shared, Substitution, TooLarge, Unresolved, is_package
 from quad_nav.errors import InputError, excerpt
 from quad_nav.files import plain_yaml
@@ -33,7 +34,7 @@ def is_launch_file(path: Path) -> bool:
 
 
 def load_launch_file(
-    path: Path, number: str = "0", arguments: Sequence[Tuple[str, str]] = ()
+    path: Path, number: str = "0", arguments: Sequence[Tuple[str, str]] = (), choice: str = ""
 ) -> ParameterTree:
     """Load the parameter tree of a launch file's move_base node.
 
@@ -41,20 +42,38 @@ def load_launch_file(
         path: The launch file.
         number: Number of the robot, if there is a node for each.
         arguments: (name, value) of arguments, as on roslaunch's command line.
+        choice: Name of a node or of a namespace above it; "" for the robot's, see ``navigators``.
 
     Raises:
         InputError: One line for everything without which there are no parameters.
     """
-    values = (Path(value) for _, value in arguments)
-    shared = Shared(path, [value for value in values if value.is_absolute()])
-    reader = _Reader(number, shared)
-    words = Substitution(path, dict(arguments), shared)
-    reader.read(path, _Scope(path, words, given=dict(arguments)))
+    reader = _read(path, arguments)
     if reader.problems:
         raise InputError(reader.problems)
-    tree = reader.tree_of_node(path)
+    tree = reader.tree_of_node(path, int(number), choice)
     tree.remarks += [Remark("", CAUTION, text, origin) for origin, text in reader.unread]
     return tree
+
+
+def navigators(path: Path, arguments: Sequence[Tuple[str, str]] = ()) -> List[str]:
+    """List a launch file's move_base nodes, with their namespaces: that of robot i is the i-th.
+
+    They are in the order of the last numbers in their names, or in that of the file if some have
+    none or the same.
+
+    Raises:
+        InputError: The file cannot be read.
+    """
+    return _read(path, arguments).navigators()
+
+
+def _read(path: Path, arguments: Sequence[Tuple[str, str]]) -> _Reader:
+    values = (Path(value) for _, value in arguments)
+    shared = Shared(path, [value for value in values if value.is_absolute()])
+    reader = _Reader(shared)
+    words = Substitution(path, dict(arguments), shared)
+    reader.read(path, _Scope(path, words, given=dict(arguments)))
+    return reader
 
 
 @dataclass(frozen=True)
@@ -75,8 +94,8 @@ class _Scope:
 class _Reader:
     """Collects a parameter server's tree from launch files."""
 
-    def __init__(self, number: str, shared: Shared) -> None:
-        self._number, self._shared = number, shared
+    def __init__(self, shared: Shared) -> None:
+        self._shared = shared
         self._server = ParameterTree()
         self._nodes: List[str] = []
         self._depth = 0
@@ -90,24 +109,34 @@ class _Reader:
             raise InputError([f"{path}:{root.line}: <{root.tag}>; expected <launch>"])
         self._children(root, scope)
 
-    def tree_of_node(self, path: Path) -> ParameterTree:
-        """Return the parameters of the node with this robot's number, or of the only one.
+    def navigators(self) -> List[str]:
+        """List the move_base nodes, see the function of this name."""
+        return in_order(dict.fromkeys(self._nodes))
+
+    def tree_of_node(self, path: Path, robot: int, choice: str) -> ParameterTree:
+        """Return the parameters of a robot's node, of the chosen one, or of the only one.
 
         Raises:
-            InputError: There is no move_base node, or there are several without this number.
+            InputError: There is no such move_base node.
         """
-        names = list(dict.fromkeys(self._nodes))
-        own = names
-        if len(names) > 1:
-            own = [name for name in names if _number_of(name) == self._number]
+        names = self.navigators()
+        own = [name for name in names if choice in (name, *name.split("/"))] if choice else names
+        if not choice and len(names) > 1:
+            own = names[robot : robot + 1]
         if len(own) != 1:
             found = ", ".join(names) if names else "none"
-            expected = "one, or one for each robot" if names else "one, or an <include> with one"
+            expected = f"one for robot {robot}" if names else "one, or an <include> with one"
+            if choice:
+                expected = f"one named {choice}"
             unread = [f"{origin}: {text}" for origin, text in self.unread]
             raise InputError(
                 [f"{path}: nodes of type move_base: {found}; expected {expected}", *unread]
             )
-        return self._server.at(own[0])
+        tree = self._server.at(own[0])
+        if len(names) > 1 and not choice and not own[0].endswith(f"move_base{robot}"):
+            text = f"robot {robot} flies with {own[0]}, one of {', '.join(names)}"
+            tree.remarks.append(Remark("", MAPPED, text, str(path)))
+        return tree
 
     def _children(self, parent: Element, scope: _Scope) -> None:
         readers = {tag: getattr(self, f"_{tag}") for tag in _TAGS}
@@ -235,9 +264,13 @@ class _Reader:
             raise Unresolved(str(error)) from error
 
 
-def _number_of(node: str) -> str:
-    """Return the digits at the end of a node's name, "" without any."""
-    return node[len(node.rstrip("0123456789")) :]
+def in_order(names: Iterable[str]) -> List[str]:
+    """Sort names by their last numbers; those of which some have none or the same stay."""
+    numbers = {name: re.findall("[0-9]+", name)[-1:] for name in names}
+    last = [int(found[0]) for found in numbers.values() if found]
+    if len(set(last)) < len(numbers):
+        return list(numbers)
+    return sorted(numbers, key=lambda name: int(numbers[name][0]))
 
 
 def _is_file(path: Path) -> bool:

@@ -15,6 +15,7 @@ from typing import Any, Dict, Iterator, List, Mapping, Optional, Tuple
 from quad_nav.config.files import COSTMAPS, ParameterTree, set_value
 from quad_nav.config.layers import LAYERS
 from quad_nav.config.notes import CAUTION, LEFT_OUT, MAPPED, Remark
+from quad_nav.config.other_planners import footprint_of
 from quad_nav.config.plugins import is_dotted, plugin_name
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.observation import SourceParams
@@ -122,6 +123,7 @@ class _Fit:
     def run(self) -> None:
         """Change the tree and add the remarks."""
         self._choose_planners()
+        self._take_footprint()
         for name in COSTMAPS:
             costmap = self._costmap(name)
             self._map_frames(costmap)
@@ -154,6 +156,15 @@ class _Fit:
                 )
             set_value(self.tree, key, found[0], "")
             self.tree.remarks.append(Remark(key, MAPPED, text))
+
+    def _take_footprint(self) -> None:
+        """Give the costmaps the footprint that only a local planner knows."""
+        places = [self.tree, *(self._costmap(name) for name in COSTMAPS)]
+        if any("footprint" in place or "robot_radius" in place for place in places):
+            return
+        for namespace in _below(self.tree):
+            for key, value in footprint_of(namespace).items():
+                set_value(self.tree, key, value, "")
 
     def _costmap(self, name: str) -> Dict[str, Any]:
         if self.tree.get(name) is None:

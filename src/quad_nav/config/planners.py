@@ -11,6 +11,7 @@ from typing import Any, Dict, Iterable, List, Mapping, Optional
 
 from quad_nav.config.fixes import with_fixes
 from quad_nav.config.notes import CAUTION, IGNORED, RENAMED, UNSUPPORTED, UNUSED, Notes, join
+from quad_nav.config.other_planners import dwa_limits, lost_names
 from quad_nav.config.plugins import (
     GLOBAL_PLANNER,
     LOCAL_PLANNER,
@@ -141,6 +142,7 @@ SLOTS: Dict[str, Slot] = {
 # Other planners that configurations often have a namespace for.
 _OTHER_PLANNERS = ("TebLocalPlannerROS", "EBandPlannerROS", "DWBLocalPlanner", "SBPLLatticePlanner")
 _DEFAULT_RATE_HZ = 20.0
+_NAMED = 4  # parameters in a line about many
 
 
 def planner_keys(tree: Mapping[str, Any]) -> List[str]:
@@ -156,7 +158,7 @@ def planner_keys(tree: Mapping[str, Any]) -> List[str]:
 
 
 def normalise_planner_names(tree: Namespace, notes: Notes) -> None:
-    """Complete old names of planners, and report planners that are not supported."""
+    """Complete old names of planners, and let others fly for planners that are not here."""
     for key, slot in SLOTS.items():
         name = tree.get(key)
         if not isinstance(name, str) or name in slot.types:
@@ -164,13 +166,16 @@ def normalise_planner_names(tree: Namespace, notes: Notes) -> None:
         if is_dotted(name):
             check_class(name, slot.interface, key, notes)
             continue
-        tree[key] = next((known for known in slot.types if plugin_name(known) == name), None)
-        if tree[key] is not None:
-            notes.remark(key, RENAMED, f"{name} is an old name of {tree[key]}")
+        known = next((known for known in slot.types if plugin_name(known) == name), None)
+        if known is not None:
+            notes.remark(key, RENAMED, f"{name} is an old name of {known}")
         else:
-            tree[key] = _substitute(tree, slot)
-            expected = f"--set {key}={tree[key]} or {_others(tree, key)}"
-            notes.problem(key, f"{name} is not supported; expected {expected}")
+            known = _substitute(tree, slot)
+            limits = _move_limits(tree, name, known)
+            others = " or ".join(one for one in slot.types if one != known)
+            text = f"{name} is not here: {known} flies{limits}; expected it, or {others}"
+            notes.remark(key, CAUTION, text)
+        tree[key] = known
 
 
 def change_planners(tree: Namespace, keys: Iterable[str], notes: Notes) -> None:
@@ -186,14 +191,24 @@ def change_planners(tree: Namespace, keys: Iterable[str], notes: Notes) -> None:
 
 
 def _substitute(tree: Namespace, slot: Slot) -> str:
-    """Return a supported planner, one that has parameters if there is any."""
+    """Return a planner that is here, one that has parameters if there is any."""
     known = list(slot.types)
     preferred = [known[0] if slot is SLOTS["base_global_planner"] else DWA_PLANNER, *known]
     return next((one for one in preferred if tree.get(plugin_name(one))), preferred[0])
 
 
-def _others(tree: Namespace, key: str) -> str:
-    return " or ".join(one for one in SLOTS[key].types if one != tree[key])
+def _move_limits(tree: Namespace, name: str, known: str) -> str:
+    """Give DWAPlannerROS the limits of another local planner; return what is kept and lost."""
+    given = tree.pop(plugin_name(name), None)
+    if not isinstance(given, dict) or not given:
+        return ""
+    kept: Dict[str, Any] = {}
+    if known == DWA_PLANNER and not tree.get(plugin_name(known)):
+        tree[plugin_name(known)] = kept = dwa_limits(given)
+    lost = lost_names(given) if kept else list(given)
+    text = f" with its {', '.join(one for one in kept if one in given)}" if kept else ""
+    more = f" and {len(lost) - _NAMED} more" if len(lost) > _NAMED else ""
+    return f"{text}, without {', '.join(lost[:_NAMED])}{more}" if lost else text
 
 
 def normalise_planners(tree: Namespace, notes: Notes) -> None:

@@ -8,13 +8,16 @@ my_robot/config:prefix=a_      with values of $(arg prefix) in its files
 my_robot.yaml                  one file, or a dump of a parameter server
 common.yaml,local_costmap=house.yaml    files in the order of loading
 my_robot.launch:model=burger   a launch file, with values of its arguments
+fleet.launch:robot1            one of its move_base nodes; otherwise that of robot i is the i-th
 """
 
 from __future__ import annotations
 
+import contextlib
+import re
 from dataclasses import replace
 from pathlib import Path
-from typing import List, Optional, Tuple
+from typing import List, Optional, Sequence, Tuple
 
 from quad_nav.config.file_sets import FileSet, file_sets, is_standard, standard_set
 from quad_nav.config.files import (
@@ -24,7 +27,7 @@ from quad_nav.config.files import (
     is_overlay,
     load_files,
 )
-from quad_nav.config.launch_file import is_launch_file, load_launch_file
+from quad_nav.config.launch_file import in_order, is_launch_file, load_launch_file, navigators
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import config_folder
 
@@ -39,7 +42,7 @@ def load_set(files: FileSet) -> ParameterTree:
     """
     first = files.files[0].path
     if is_launch_file(first):
-        return load_launch_file(first, files.number, files.arguments)
+        return load_launch_file(first, files.number, files.arguments, files.name)
     return load_files(files.files, {**dict(files.arguments), "i": files.number})
 
 
@@ -55,6 +58,9 @@ def robot_set(name: str, number: str) -> FileSet:
     sets, _ = sets_of(name, number)
     if len(sets) == 1:
         return sets[0]
+    numbered = _of_numbered_folders(sets)
+    if int(number) < len(numbered):
+        return numbered[int(number)]
     lines = [f"--config {path}:{label(one, path)}" for one in sets[:_MOST_LISTED]]
     more = f" and {len(sets) - _MOST_LISTED} more" if len(sets) > _MOST_LISTED else ""
     raise InputError(
@@ -82,8 +88,10 @@ def sets_of(name: str, number: Optional[str] = None) -> Tuple[List[FileSet], Lis
     path, choice = split_source(name)
     if not choice and is_overlay(path):
         return [standard_set(path, number or "0")], []
+    if is_launch_file(path):
+        return _sets_of_launch_file(path, choice, number), []
     if not path.is_dir():
-        return [_set_of_files(path, choice, number or "0")], []
+        return [_set_of_files(path, number or "0")], []
     sets, left = file_sets(path, number)
     if not sets:
         expected = "expected files such as costmap_common_params.yaml"
@@ -172,10 +180,32 @@ def _with_folder_above(folder: Path, number: Optional[str]) -> List[FileSet]:
     ]
 
 
-def _set_of_files(path: Path, choice: str, number: str) -> FileSet:
-    """Return the set of a launch file, of one file, or of files with commas between them."""
-    if is_launch_file(path):
-        return FileSet(None, "", (PlacedFile(path, ()),), number, _arguments(path, choice))
+def _of_numbered_folders(sets: Sequence[FileSet]) -> List[FileSet]:
+    """Return sets in the order of their folders' numbers, [] if nothing but those tells them."""
+    folders = {str(one.folder): one for one in sets}
+    kinds = {(re.sub("[0-9]+$", "", folder), one.name) for folder, one in folders.items()}
+    if len(folders) < len(sets) or len(kinds) > 1 or not all(one[-1:].isdigit() for one in folders):
+        return []
+    return [folders[folder] for folder in in_order(folders)]
+
+
+def _sets_of_launch_file(path: Path, choice: str, number: Optional[str]) -> List[FileSet]:
+    """Return the set of a robot, or that of each move_base node if no robot is named."""
+    words = choice.split(",")
+    arguments = _arguments(path, ",".join(word for word in words if "=" in word))
+    one = ",".join(word for word in words if "=" not in word)
+    nodes: List[str] = []
+    if number is None and not one:
+        with contextlib.suppress(InputError):  # load_set reports it
+            nodes = navigators(path, arguments)
+    file = PlacedFile(path, ())
+    if len(nodes) < 2:
+        return [FileSet(None, one, (file,), number or "0", arguments)]
+    return [FileSet(None, node, (file,), str(k), arguments) for k, node in enumerate(nodes)]
+
+
+def _set_of_files(path: Path, number: str) -> FileSet:
+    """Return the set of one file, or of files with commas between them."""
     words = [str(path)] if path.is_file() else str(path).split(",")
     return FileSet(None, "", tuple(placed_file(word.strip()) for word in words), number)
 

@@ -1,12 +1,13 @@
 """Substitutions of roslaunch: ``$(arg name)``, ``$(find package)``, ``$(env NAME)`` and others.
 
-Expressions are evaluated without Python's ``eval``: comparisons, ``and``, ``or``, ``not``,
-conditions, sums, lists, constants, and the functions that roslaunch offers.
+Expressions are evaluated without Python's ``eval``: operators but powers, conditions, items, lists,
+constants, the functions that roslaunch offers, those of ``math``, and a few of numbers and texts.
 """
 
 from __future__ import annotations
 
 import ast
+import math
 import operator
 import os
 import re
@@ -29,6 +30,7 @@ MAX_EXPRESSION = 1000
 _PACKAGE = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,99}")
 _PACKAGE_FILE = "package.xml"
 _LEVELS = 6  # folders above a launch file in which packages are looked for
+_FIND = re.compile(r"\$\(find\s+([^()]*)\)")
 _COMPARISONS: Dict[type, Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
@@ -39,10 +41,27 @@ _COMPARISONS: Dict[type, Callable[[Any, Any], Any]] = {
     ast.In: lambda a, b: a in b,
     ast.NotIn: lambda a, b: a not in b,
 }
-
+_OPERATORS: Dict[type, Callable[..., Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.FloorDiv: operator.floordiv,
+    ast.Mod: operator.mod,
+    ast.Not: operator.not_,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+}
+_PLAIN: Dict[str, Callable[..., Any]] = {
+    **{one.__name__: one for one in (int, float, str, bool, abs, min, max, round, len)},
+    **{name: getattr(math, name) for name in ("sqrt", "ceil", "floor", "hypot", "degrees")},
+    **{name: getattr(math, name) for name in ("radians", "sin", "cos", "tan", "atan", "atan2")},
+}
+_CONSTANTS = {"true": True, "false": False, "pi": math.pi, "e": math.e}
+_OF_TEXTS = ("startswith", "endswith", "lower", "upper", "strip", "split")
 
 _FAULTS = (
-    *(SyntaxError, ValueError, TypeError, KeyError, ArithmeticError),
+    *(SyntaxError, ValueError, TypeError, LookupError, ArithmeticError),
     *(RecursionError, MemoryError),  # of expressions that are nested too deeply
 )
 
@@ -132,7 +151,16 @@ class Substitution:
         self.shared.take(len(text))
         if text.startswith("$(eval ") and text.endswith(")"):
             return self._word(text[2:-1])
-        return SUBSTITUTION.sub(lambda match: self._word(match.group(1)), text)
+        # roslaunch looks for packages last, and puts a slash between their folders and a path.
+        text = SUBSTITUTION.sub(self._unless_package, text)
+        return _FIND.sub(self._folder, text)
+
+    def _unless_package(self, match: re.Match[str]) -> str:
+        return match.group() if _FIND.match(match.group()) else self._word(match.group(1))
+
+    def _folder(self, match: re.Match[str]) -> str:
+        folder, rest = self._word(f"find {match.group(1)}"), match.string[match.end() :]
+        return folder if rest[:1] in ("", "/", " ") else f"{folder}/"
 
     def _word(self, inner: str) -> str:
         word = self._resolved(inner)
@@ -151,8 +179,8 @@ class Substitution:
         if name == "anon":
             return rest
         if name in ("env", "optenv"):
-            variable, _, default = rest.partition(" ")
-            value = os.environ.get(variable, default if name == "optenv" else None)
+            variable, *default = rest.split()
+            value = os.environ.get(variable, " ".join(default) if name == "optenv" else None)
             if value is None:
                 raise Unresolved(f"the environment variable {variable} is not set")
             return value
@@ -212,36 +240,60 @@ class Substitution:
         if isinstance(node, ast.Constant):
             return node.value
         if isinstance(node, ast.Name):
+            if node.id in _CONSTANTS and node.id not in self.arguments:
+                return _CONSTANTS[node.id]
             return _converted(self._arg(node.id))
         if isinstance(node, (ast.List, ast.Tuple)):
             return [self._value(one) for one in node.elts]
         if isinstance(node, ast.BoolOp):
-            together = all if isinstance(node.op, ast.And) else any
-            return together(self._value(one) for one in node.values)
-        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
-            return not self._value(node.operand)
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
-            return self._value(node.left) + self._value(node.right)
+            value = None
+            for one in node.values:  # the last one that is looked at counts, as in Python
+                value = self._value(one)
+                if bool(value) is isinstance(node.op, ast.Or):
+                    break
+            return value
+        if isinstance(node, (ast.UnaryOp, ast.BinOp)) and type(node.op) in _OPERATORS:
+            operands = [node.operand] if isinstance(node, ast.UnaryOp) else [node.left, node.right]
+            return _bounded(_OPERATORS[type(node.op)], *map(self._value, operands))
         if isinstance(node, ast.IfExp):
             return self._value(node.body if self._value(node.test) else node.orelse)
-        if isinstance(node, ast.Compare) and len(node.ops) == 1:
-            compare = _COMPARISONS[type(node.ops[0])]
-            return compare(self._value(node.left), self._value(node.comparators[0]))
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
-            return self._call(node.func.id, [self._value(one) for one in node.args])
+        if isinstance(node, ast.Compare):
+            sides = [self._value(one) for one in (node.left, *node.comparators)]
+            compared = zip(node.ops, sides, sides[1:])
+            return all(_COMPARISONS[type(op)](left, right) for op, left, right in compared)
+        if isinstance(node, ast.Subscript):
+            index: Any = node.slice
+            if type(index).__name__ == "Index":  # of Python 3.8
+                index = index.value
+            return self._value(node.value)[self._value(index)]
+        if isinstance(node, ast.Call) and not node.keywords:
+            return self._called(node.func, [self._value(one) for one in node.args])
         raise ValueError(f"{type(node).__name__} is not supported")
 
+    def _called(self, function: ast.expr, arguments: Any) -> Any:
+        if isinstance(function, ast.Name):
+            return self._call(function.id, arguments)
+        if isinstance(function, ast.Attribute) and function.attr in _OF_TEXTS:
+            return getattr(str, function.attr)(self._value(function.value), *arguments)
+        raise ValueError(f"{type(function).__name__} is not supported")
+
     def _call(self, name: str, arguments: Any) -> Any:
-        plain: Dict[str, Any] = {"int": int, "float": float, "str": str, "bool": bool}
-        if name in plain:
+        if name in _PLAIN:
             if name in ("int", "float") and len(str(arguments)) > MAX_EXPRESSION:
                 raise ValueError(f"{name}() of more than {MAX_EXPRESSION} characters")
-            return plain[name](*arguments)
+            return _PLAIN[name](*arguments)
         if name == "arg":
             return _converted(self._arg(*arguments))
         if name in ("find", "env", "optenv", "dirname", "anon"):
             return self._word(" ".join((name, *map(str, arguments))))
         raise ValueError(f"{name}() is not supported")
+
+
+def _bounded(calculate: Callable[..., Any], *operands: Any) -> Any:
+    """Calculate with numbers, or join texts or lists: a repeated text takes all memory."""
+    if calculate is not operator.add and any(isinstance(one, (str, list)) for one in operands):
+        raise ValueError(f"{calculate.__name__} of texts or lists is not supported")
+    return calculate(*operands)
 
 
 def _converted(word: str) -> Any:

@@ -14,6 +14,7 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav import config
 from quad_nav.config import Configuration
+from quad_nav.config.cautions import body_caution
 from quad_nav.config.notes import without_effect
 from quad_nav.config.robot_tree import RobotSource, robot_tree
 from quad_nav.errors import InputError
@@ -132,11 +133,21 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
         *last_goal_conflicts(robots, request.robot_radius),
         *file_warnings(robots, configurations),
         *small,
+        *_body_cautions(configurations, float(request.robot_radius)),
     )
     notes = tuple(coverage_notes(configurations))
     radius_m = float(request.robot_radius)
     scenario = Scenario(scene, tuple(robots), configurations, warnings, radius_m, notes)
     return scenario, list(dict.fromkeys(problems + faults))
+
+
+def _body_cautions(configurations: Sequence[Optional[Configuration]], body_m: float) -> List[str]:
+    """Return a line on each robot whose footprint is smaller than its body."""
+    return [
+        f"quad{number}: {place}: {text}"
+        for number, one in enumerate(configurations)
+        for place, text in (body_caution(one.local_costmap, body_m) if one else ())
+    ]
 
 
 def body_radius_m(configurations: Sequence[Optional[Configuration]], own_m: float) -> float:

@@ -192,31 +192,38 @@ def test_planners_change_in_flight_and_back(key, name):
 
 
 @pytest.mark.parametrize(
-    "tree, fault",
+    "tree, told",
     [
         (
             {"base_global_planner": "sbpl/SBPLLatticePlanner"},
-            "base_global_planner: sbpl/SBPLLatticePlanner is not supported; expected --set"
-            " base_global_planner=navfn/NavfnROS or global_planner/GlobalPlanner or"
-            " carrot_planner/CarrotPlanner",
+            "sbpl/SBPLLatticePlanner is not here: navfn/NavfnROS flies; expected it, or"
+            " global_planner/GlobalPlanner or carrot_planner/CarrotPlanner",
         ),
         (
             {"base_local_planner": "teb"},
-            "base_local_planner: teb is not supported; expected"
-            " --set base_local_planner=dwa_local_planner/DWAPlannerROS or"
+            "teb is not here: dwa_local_planner/DWAPlannerROS flies; expected it, or"
             " base_local_planner/TrajectoryPlannerROS",
         ),
         (
             {"base_local_planner": "teb", "TrajectoryPlannerROS": {"max_vel_x": 0.5}},
-            "base_local_planner: teb is not supported; expected"
-            " --set base_local_planner=base_local_planner/TrajectoryPlannerROS or"
+            "teb is not here: base_local_planner/TrajectoryPlannerROS flies; expected it, or"
             " dwa_local_planner/DWAPlannerROS",
         ),
+    ],
+)
+def test_one_that_has_parameters_flies_for_a_planner_that_is_not_here(tree, told):
+    (key,) = [key for key in tree if key.startswith("base_")]
+    assert f"/{key}: {told}" in load(tree).warnings
+
+
+@pytest.mark.parametrize(
+    "tree, fault",
+    [
         (
             {"base_global_planner": None},
             "base_global_planner: None is not a string; expected a plugin's name",
         ),
     ],
 )
-def test_planner_that_is_not_supported_is_refused_with_one_that_has_parameters(tree, fault):
+def test_a_planner_without_a_name_is_refused(tree, fault):
     assert problems(tree) == [f"/{fault}"]

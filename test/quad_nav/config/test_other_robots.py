@@ -207,12 +207,6 @@ def test_the_planner_with_parameters_is_flown(tmp_path, planners, chosen, told):
     assert fitted(named, 0)["base_local_planner"] == TRAJECTORY
 
 
-def test_parameters_of_a_planner_that_is_not_here_are_refused(tmp_path):
-    teb = fitted(tree_of(tmp_path, "TebLocalPlannerROS: {max_vel_x: 0.4}"), 0)
-    with pytest.raises(InputError, match="TebLocalPlannerROS is not supported; expected --set"):
-        load(teb)
-
-
 def test_a_flight_has_the_robots_body(tmp_path):
     (tmp_path / "robot.yaml").write_text(ROBOT)
     setup = read_setup(
