@@ -28,10 +28,10 @@ def refusal(version, executable):
         "quad: Python %d.%d at %s: expected Python %d.%d to %d.%d; for other versions there are no "
         "wheels of the physics engine, pybullet, and compiling it takes a quarter of an hour.\n"
         "Install quad with another Python, from its checkout:\n"
-        "    uv tool install --python 3.11 .        # or try it: uvx --python 3.11 --from . quad fly\n"
+        "    uv tool install --python 3.11 .  # or try it: uvx --python 3.11 --from . quad fly\n"
         "    conda create --name quad python=3.11 && conda activate quad && pip install .\n"
         "    QUAD_PYTHON=python3.11 make venv\n"
-        "With ROS, whose modules are for the system's Python: Debian 12 or 13, or a container of it:\n"
+        "With ROS, whose modules are the system's Python's: Debian 12 or 13, or a container:\n"
         "    docker build --tag quad ."
     ) % (version[0], version[1], executable, first[0], first[1], end[0], end[1] - 1)
 

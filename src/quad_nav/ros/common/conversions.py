@@ -21,6 +21,7 @@ from geometry_msgs.msg import (
     Vector3,
 )
 from nav_msgs.msg import Odometry
+from numpy.typing import NDArray
 from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
@@ -133,8 +134,11 @@ class _Floats(np.ndarray):
         return self.tobytes()
 
 
-class ScanMessage(numpy_msg(LaserScan)):
+class ScanMessage(numpy_msg(LaserScan)):  # type: ignore[misc]
     """A LaserScan whose ranges are an array, which rospy serialises without conversion."""
+
+    ranges: NDArray[np.float32]
+    intensities: NDArray[np.float32]
 
     def serialize(self, buff: BytesIO) -> None:
         """Write the message."""
