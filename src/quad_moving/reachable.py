@@ -33,7 +33,8 @@ class Standing(NamedTuple):
     left_m: float  # of its origin, relative to the robot
     low_m: float
     resolution_m: float
-    limit: int  # cells of this cost or a higher one are in the way of the robot's centre
+    limit: float  # cells of this cost or a higher one are in the way of a centre that rests
+    decay_s_per_m: float = 0.0  # the limit of one that flies is lower: it falls with the speed
 
 
 class Obstacles(NamedTuple):
@@ -78,7 +79,7 @@ def needed_accelerations(
         needed: float64[c], written: m/s^2; +inf if no obstacle can touch the robot, ``BLOCKED`` if
             the robot cannot stop before what stands.
     """
-    inside = _is_blocked(standing, 0.0, 0.0)
+    inside = _is_blocked(standing, 0.0, 0.0, 0.0, 0.0)
     for c in range(commands.shape[0]):
         needed[c] = np.inf
         if not _stops_in_time(body, standing, flight, velocity, commands[c]):
@@ -91,7 +92,7 @@ def needed_accelerations(
             stops = flight.rests and k > flight.hold
             x, y = state[0], state[1]
             state = _moved(body, flight.step_s, state, commands[c], stops)
-            if not inside and _is_blocked(standing, state[0], state[1]):  # it stops before
+            if not inside and _is_blocked(standing, state[0], state[1], 0.0, 0.0):  # stops before
                 state = (x, y, 0.0, 0.0)
             if flight.rests and math.hypot(state[2], state[3]) < body.still_mps:
                 if stops:
@@ -129,26 +130,27 @@ def _stops_in_time(
 
     One that is too near to something already has to leave it while it follows the command.
     """
-    inside = _is_blocked(standing, 0.0, 0.0)
+    inside = _is_blocked(standing, 0.0, 0.0, velocity[0], velocity[1])
     state = (0.0, 0.0, velocity[0], velocity[1])
     k = 0
     while k < flight.hold or math.hypot(state[2], state[3]) >= body.still_mps:
         k += 1
         state = _moved(body, flight.step_s, state, command, k > flight.hold)
         is_leaving = inside and k <= flight.hold
-        if not is_leaving and _is_blocked(standing, state[0], state[1]):
+        if not is_leaving and _is_blocked(standing, state[0], state[1], state[2], state[3]):
             return False
-    return not _is_blocked(standing, state[0], state[1])
+    return not _is_blocked(standing, state[0], state[1], 0.0, 0.0)
 
 
 @njit(cache=True, nogil=True)
-def _is_blocked(standing: Standing, x: float, y: float) -> bool:
-    """Return whether something stands at a place; outside of the costmap nothing does."""
+def _is_blocked(standing: Standing, x: float, y: float, vx: float, vy: float) -> bool:
+    """Return whether something stands in the way; outside of the costmap nothing does."""
     column = int(math.floor((x - standing.left_m) / standing.resolution_m))
     row = int(math.floor((y - standing.low_m) / standing.resolution_m))
     if row < 0 or column < 0 or row >= standing.costs.shape[0] or column >= standing.costs.shape[1]:
         return False
-    return bool(standing.costs[row, column] >= standing.limit)
+    limit = standing.limit * math.exp(-standing.decay_s_per_m * math.hypot(vx, vy))
+    return bool(standing.costs[row, column] >= limit)
 
 
 @njit(cache=True, nogil=True)

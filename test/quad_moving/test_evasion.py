@@ -50,7 +50,7 @@ def tracks(*states, suspects=()):
 
 def situation(seen, pose=HERE, velocity=None, costs=None, now_s=10.0, peers=ALONE):
     costs = np.zeros(SPEC.shape, np.uint8) if costs is None else costs
-    costmap = SimpleNamespace(spec=SPEC, costs=costs, inscribed_radius_m=0.35)
+    costmap = SimpleNamespace(layers={}, spec=SPEC, costs=costs, inscribed_radius_m=0.35)
     velocity = velocity or Twist2D()
     return Situation(
         now_s, 0.1, pose, pose, HERE, velocity, velocity, None, costmap, PLANNER, seen, peers
@@ -102,6 +102,15 @@ def test_a_command_after_which_the_robot_cannot_stop_before_a_wall_is_none():
         wall = Standing(np.array([[0, 254]], np.uint8), wall_x_m - 1.0, -0.5, 1.0, 253)
         found = needed([1.0, 0.0], far, (1.0, 0.0), standing=wall, body=body)
         assert bool(found == math.inf) is stops
+
+
+@pytest.mark.parametrize("speed_mps, stops", [(0.5, True), (1.0, False)])
+def test_a_robot_that_flies_keeps_off_what_stands(speed_mps, stops):
+    """The limit is 253 exp(-v): 153 at 0.5 m/s and 93 at 1 m/s; the cells ahead cost 100."""
+    body, far = Body(10.0, 2.0, 0.05), [9.0, 9.0, 0.0, 0.0]
+    wall = Standing(np.array([[0, 100]], np.uint8), -0.9, -0.5, 1.0, 253, 1.0)
+    found = needed([speed_mps, 0.0], far, (speed_mps, 0.0), standing=wall, body=body)
+    assert bool(found == math.inf) is stops
 
 
 def test_nothing_that_moves_leaves_the_command_as_it_is():
