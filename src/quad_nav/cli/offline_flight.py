@@ -26,6 +26,7 @@ from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly as fly_setup
 from quad_nav.scenario.flight_facts import offline_facts
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
+from quad_nav.scenario.goal_plans import unreachable_goals
 from quad_nav.sim.flight import AIRFRAMES
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.odometry import OdomDrift
@@ -79,7 +80,7 @@ def fly_mission(
             drawn = FlightPictures(setup, outputs)
             observers = _observers(record)
             if not quiet:
-                show_warnings(setup.warnings)
+                show_warnings((*setup.warnings, *unreachable_goals(setup)))
             facts = offline_facts(options, setup, ["quad", *sys.argv[1:]])
             status = _fly(setup, facts, observers, outputs, drawn, quiet, processes, page)
         if page is None or status == EXIT_INTERRUPTED or not _is_wanted_again(page):

@@ -60,7 +60,8 @@ def read_xml(path: Path, max_elements: int = MAX_ELEMENTS) -> Element:
         InputError: The file cannot be read, is not XML, or is too large; with the line.
     """
     builder = _Builder(path, max_elements)
-    content = read_bytes(path, MAX_BYTES)
+    # Some files have blanks before the declaration, which most readers accept.
+    content = read_bytes(path, MAX_BYTES).lstrip(b" \t\r\n")
     try:
         defusedxml.sax.parseString(content, builder, forbid_dtd=True)
     except DefusedXmlException as error:

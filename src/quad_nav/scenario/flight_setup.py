@@ -29,6 +29,7 @@ from quad_nav.scenario.scene_map import scene_map_problem
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.simulation_params import SimulationParams
 from quad_nav.sim.start_poses import start_poses
+from quad_nav.sim.unseen import unseen_obstacles
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,13 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         steps_per_scan(options.scans_per_s),
         options.seed,
         options.time_limit_s,
-        warnings=(*scene.remarks, *scenario.notes, *scenario.warnings, *warnings),
+        warnings=(
+            *scene.remarks,
+            *unseen_obstacles(scene),
+            *scenario.notes,
+            *scenario.warnings,
+            *warnings,
+        ),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Dict, List, Optional, Sequence, Tuple
 
@@ -10,29 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.config import Configuration
-from quad_nav.costmap.inflation import InflationLayerParams
-from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
-from quad_nav.costmap.map_edge import closed_edge
-from quad_nav.costmap.static import StaticLayerParams, StaticMap
-from quad_nav.errors import InputError, PlanningError
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.goal_file import GoalSequence, PlaceCheck, load_goals
 from quad_nav.mission.robot_goals import goal_paths
-from quad_nav.scenario.assembly import build_global_planner
 from quad_nav.scenario.flight_setup import (
     FlightOptions,
     read_readable_parts,
     read_setup,
     with_default_files,
 )
-from quad_nav.scenario.goal_checks import bounds_of, place_check
-from quad_nav.scenario.scene_map import scene_map, scene_map_problem, scene_occupancy
+from quad_nav.scenario.goal_checks import place_check
+from quad_nav.scenario.goal_plans import GoalPlans
 from quad_nav.sim.movers import Movers
 from quad_nav.sim.obstacles import Obstacle
-from quad_nav.sim.scene import Scene
-
-_ROUNDING_M = 1e-9
-NO_PLAN: NDArray[np.float64] = np.empty((0, 2))
 
 
 @dataclass(frozen=True)
@@ -93,7 +85,7 @@ class MissionPreview:
         self.moving = self._starting(options.seed)
         self._configurations = dict(enumerate(configurations))
         self._sequences = {int(one.name[len("quad") :]): one.sequence for one in robots}
-        self._costmaps: Dict[CostmapParams, LayeredCostmap] = {}
+        self._plans = GoalPlans(self.scene, self._configurations)
         self.files: Dict[int, Path] = {}
         options = with_default_files(options)
         if options.goals is not None:
@@ -135,80 +127,9 @@ class MissionPreview:
         faults = tuple(check(goal.x_m, goal.y_m) or "" for goal in sequence.goals)
         starts = self.scene.starts if self.scene else ()
         start = starts[number] if number < len(starts) else None
-        plans, warnings = self._plans(number, start, sequence, faults)
+        plans, warnings = self._plans.plans(number, start, sequence, faults)
         return RobotPreview(number, start, sequence, faults, tuple(plans), tuple(warnings))
-
-    def _plans(
-        self,
-        number: int,
-        start: Optional[Pose2D],
-        sequence: GoalSequence,
-        faults: Sequence[str],
-    ) -> Tuple[List[NDArray[np.float64]], List[str]]:
-        """Plan from goal to goal; faulty goals, and those without a plan, are left out."""
-        plans = [NO_PLAN for _ in sequence.goals]
-        warnings: List[str] = []
-        costmap, configuration = self.costmap(number), self._configurations.get(number)
-        if costmap is None and configuration is not None and self.scene is not None:
-            warnings.append(f"quad{number}: no costmap and no plans: the scene has too many cells")
-        if costmap is None or configuration is None or start is None:
-            return plans, warnings
-        planner = build_global_planner(configuration.global_planner, costmap.footprint)
-        here, name = start, "the start"
-        for index, (goal, fault) in enumerate(zip(sequence.goals, faults)):
-            if fault:
-                continue
-            goal_name = f"goal {index + 1}"
-            try:
-                with closed_edge(costmap, here, goal.pose, configuration.navigator.plan_inside_map):
-                    plan = planner.make_plan(costmap.spec, costmap.costs.copy(), here, goal.pose)
-            except PlanningError as error:
-                warnings.append(
-                    f"quad{number}: {goal_name} ({goal.x_m:g}, {goal.y_m:g}): no path from {name}"
-                    f" over the global costmap of the whole scene: {error}"
-                )
-                continue
-            plans[index] = plan[:, :2]
-            here, name = goal.pose, goal_name
-        return plans, warnings
 
     def costmap(self, number: int) -> Optional[LayeredCostmap]:
         """Return a robot's global costmap as if it had seen the whole scene; None if unknown."""
-        configuration = self._configurations.get(number)
-        if configuration is None or self.scene is None:
-            return None
-        params = _without_sensors(configuration.global_costmap)
-        has_no_place = bounds_of(configuration.global_costmap) is None
-        if has_no_place and scene_map_problem(self.scene, params):
-            return None  # a scene of kilometres in cells of centimetres
-        if params not in self._costmaps:
-            self._costmaps[params] = _costmap(params, self.scene, has_no_place)
-        return self._costmaps[params]
-
-
-def _without_sensors(params: CostmapParams) -> CostmapParams:
-    """Put one map of the scene in the place of maps and sensors; the same for equal robots."""
-    inflation = [
-        (name, layer)
-        for name, layer in params.layers
-        if isinstance(layer, InflationLayerParams) and layer.enabled
-    ]
-    return replace(
-        params,
-        global_frame="map",
-        robot_base_frame="base_link",
-        rolling_window=False,
-        layers=(("scene", StaticLayerParams()), *inflation),
-    )
-
-
-def _costmap(params: CostmapParams, scene: Scene, covers_scene: bool) -> LayeredCostmap:
-    costmap = LayeredCostmap(params)
-    if covers_scene:
-        costmap.set_map(scene_map(scene, params.resolution_m))
-    else:
-        # A LIDAR marks the cells that surfaces lie in, also those of walls that end at the costmap.
-        seen = scene_occupancy(scene, params.spec, 0.5 * params.resolution_m + _ROUNDING_M)
-        costmap.set_map(StaticMap(seen, params.spec))
-    costmap.update(0.0, Pose2D(0.0, 0.0))
-    return costmap
+        return self._plans.costmap(number)

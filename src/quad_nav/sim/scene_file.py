@@ -200,7 +200,8 @@ def _read_arena(
             return unknown
         if imported.extent is None:
             problem = "missing, and the world has no obstacles that give the arena its size"
-            check.fault("size", f"{problem}; expected a scene with world, size and origin")
+            expected = "expected a scene with world, size and origin, or the map of map_server"
+            check.fault("size", "; ".join((problem, *imported.remarks, expected)))
             return unknown
         x, y, end_x, end_y = imported.extent
         return (x, y), (end_x - x, end_y - y)

@@ -1,4 +1,4 @@
-"""Values, shapes and actors of SDF files; faults are collected with their lines.
+"""Values, shapes and actors of SDF files; one with a fault is left out, with the fault's line.
 
 Gazebo classic leads an actor through the waypoints of its trajectories, one trajectory after the
 other, by the spline of ``motion``. ``<delay_start>`` is waited before each cycle, as SDF says. The
@@ -9,6 +9,7 @@ cylinder, stands on the floor.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Dict, List, Optional, Tuple, Union
 
@@ -37,22 +38,22 @@ class NotRepresented(Exception):
     """Reason in a few words why an element is left out of the scene."""
 
 
+@dataclass(frozen=True)
 class SdfReader:
-    """Reader of the values in one file; adds a message to ``problems`` for each fault."""
+    """Reader of the values in one file."""
 
-    def __init__(self, path: Path, problems: List[str]) -> None:
-        self.path = path
-        self.problems = problems
+    path: Path
 
-    def fault(self, element: Element, problem: str) -> None:
-        """Add a fault of an element."""
-        self.problems.append(f"{self.path}: line {element.line}: <{element.tag}>: {problem}")
+    def fault(self, element: Element, problem: str) -> NotRepresented:
+        """Return the exception for a fault of an element."""
+        place = f"{self.path.name}: line {element.line}: <{element.tag}>"
+        return NotRepresented(f"{place}: {problem}")
 
     def pose(self, parent: Element, default: Pose3D = IDENTITY) -> Pose3D:
         """Return the ``<pose>`` of an element, relative to the element that contains it.
 
         Raises:
-            NotRepresented: The pose is relative to a named frame.
+            NotRepresented: It has a fault, or is relative to a named frame.
         """
         element = parent.first("pose")
         if element is not None and element.attributes.get("relative_to", "world") != "world":
@@ -61,45 +62,40 @@ class SdfReader:
             return default
         if element.attributes.get("rotation_format") == "quat_xyzw":
             values = self.numbers(element, 7, "x y z and a quaternion x y z w")
-            length = math.sqrt(sum(v * v for v in values[3:])) if values else 0.0
-            if not values or length == 0.0:
+            length = math.sqrt(sum(v * v for v in values[3:]))
+            if length == 0.0:
                 return default
             qx, qy, qz, qw = (v / length for v in values[3:])
             return Pose3D(values[0], values[1], values[2], (qx, qy, qz, qw))
         values = self.numbers(element, 6, "x y z roll pitch yaw")
-        if not values:
-            return default
         unit = math.pi / 180 if element.attributes.get("degrees") in _TRUE else 1.0
         roll, pitch, yaw = (unit * v for v in values[3:])
         return Pose3D(values[0], values[1], values[2], quaternion_from_euler(roll, pitch, yaw))
 
     def length(self, parent: Element, tag: str) -> float:
-        """Return a length above 0 in m, NaN after a fault."""
+        """Return a length above 0 in m."""
         return self.lengths(parent, tag, 1, "a number of metres")[0]
 
     def lengths(self, parent: Element, tag: str, count: int, expected: str) -> List[float]:
-        """Return lengths above 0 in m, NaNs after a fault."""
+        """Return lengths above 0 in m."""
         element = parent.first(tag)
-        faulty = [math.nan] * count
         if element is None:
-            self.fault(parent, f"<{tag}> is missing, expected {expected}")
-            return faulty
+            raise self.fault(parent, f"<{tag}> is missing, expected {expected}")
         values = self.numbers(element, count, expected)
-        if values and min(values) <= 0.0:
-            self.fault(element, f"'{element.text.strip()}', expected {expected}, above 0")
-            return faulty
-        return values or faulty
+        if min(values) <= 0.0:
+            raise self.fault(element, f"'{element.text.strip()}', expected {expected}, above 0")
+        return values
 
-    def numbers(self, element: Element, count: int, expected: str) -> Optional[List[float]]:
-        """Return the finite numbers of a text, separated by blanks; None after a fault."""
+    def numbers(self, element: Element, count: int, expected: str) -> List[float]:
+        """Return the finite numbers of a text, separated by blanks."""
         text = element.text.strip()
         try:
             values = [float(word) for word in text.split()]
         except ValueError:
             values = []
         if len(values) != count or not all(abs(v) <= MAX_LENGTH_M for v in values):
-            self.fault(element, f"'{text}', expected {expected}")
-            return None
+            limit = f", at most {MAX_LENGTH_M:g}" if len(values) == count else ""
+            raise self.fault(element, f"'{text}', expected {expected}{limit}")
         return values
 
 
@@ -111,10 +107,10 @@ def is_true(text: str) -> bool:
 def obstacle_of(
     reader: SdfReader, geometry: Element, name: str, map_from_shape: Pose3D
 ) -> Optional[Obstacle]:
-    """Convert a collision's ``<geometry>`` to an obstacle; None if it is the floor or has a fault.
+    """Convert a collision's ``<geometry>`` to an obstacle; None if it is the floor.
 
     Raises:
-        NotRepresented: No obstacle has this shape or pose.
+        NotRepresented: It has a fault, or no obstacle has this shape or pose.
     """
     if not geometry.children:
         raise NotRepresented("geometry without a shape")
@@ -124,11 +120,8 @@ def obstacle_of(
         return None
     if shape.tag not in makers:
         raise NotRepresented(shape.tag)
-    faults_before = len(reader.problems)
     obstacle = makers[shape.tag](reader, shape, name, map_from_shape)
-    if obstacle is None or len(reader.problems) > faults_before:
-        return None
-    if obstacle.top_m <= FLOOR_M:
+    if obstacle is not None and obstacle.top_m <= FLOOR_M:
         raise NotRepresented("nothing above the floor")
     return obstacle
 
@@ -179,23 +172,20 @@ def _tilt_rad(axis: NDArray[np.float64]) -> float:
     return math.atan2(math.hypot(axis[0], axis[1]), abs(axis[2]))
 
 
-def actor_of(reader: SdfReader, actor: Element, name: str) -> Union[Cylinder, MovingObstacle, None]:
-    """Convert an ``<actor>`` to a moving obstacle; None after a fault.
+def actor_of(reader: SdfReader, actor: Element, name: str) -> Union[Cylinder, MovingObstacle]:
+    """Convert an ``<actor>`` to a moving obstacle.
 
     Without waypoints or with ``<auto_start>`` false it is a cylinder at rest.
 
     Raises:
-        NotRepresented: A plugin moves it, or a pose is relative to a frame.
+        NotRepresented: It has a fault, a plugin moves it, or a pose is relative to a frame.
     """
     if actor.first("plugin") is not None:
         raise NotRepresented("actor that a plugin moves")
-    faults_before = len(reader.problems)
     pose = reader.pose(actor)
     script = actor.first("script") or Element("script", {}, actor.line)
     delay_s = _seconds(reader, script, "delay_start")
     times_s, poses, tension = _waypoints(reader, script)
-    if len(reader.problems) > faults_before:
-        return None
     if not times_s or not is_true(script.text_of("auto_start", "true")):
         return Cylinder(name, pose.x_m, pose.y_m, PERSON_RADIUS_M, PERSON_HEIGHT_M)
     motion = Motion(
@@ -223,8 +213,7 @@ def _waypoints(
             time_s = _seconds(reader, waypoint, "time", required=True)
             waypoints[time_s] = reader.pose(waypoint, IDENTITY)
         if len(times_s) + len(waypoints) > MAX_WAYPOINTS:
-            reader.fault(script, f"more than {MAX_WAYPOINTS} waypoints")
-            break
+            raise reader.fault(script, f"more than {MAX_WAYPOINTS} waypoints")
         for time_s in sorted(waypoints):
             if not times_s or begin_s + time_s > times_s[-1]:
                 planar = waypoints[time_s].to_2d()
@@ -235,17 +224,16 @@ def _waypoints(
 
 
 def _seconds(reader: SdfReader, parent: Element, tag: str, required: bool = False) -> float:
-    """Return a time of 0 or more; 0 after a fault."""
+    """Return a time of 0 or more; 0 without one."""
     element = parent.first(tag)
     if element is None:
         if required:
-            reader.fault(parent, f"<{tag}> is missing, expected seconds")
+            raise reader.fault(parent, f"<{tag}> is missing, expected seconds")
         return 0.0
-    values = reader.numbers(element, 1, "seconds")
-    if values and not 0.0 <= values[0] <= _MAX_TIME_S:
-        reader.fault(element, f"'{element.text.strip()}', expected seconds, 0 or more")
-        return 0.0
-    return values[0] if values else 0.0
+    (seconds,) = reader.numbers(element, 1, "seconds")
+    if not 0.0 <= seconds <= _MAX_TIME_S:
+        raise reader.fault(element, f"'{element.text.strip()}', expected seconds, 0 or more")
+    return seconds
 
 
 def _tension(reader: SdfReader, trajectory: Element) -> float:
@@ -256,6 +244,5 @@ def _tension(reader: SdfReader, trajectory: Element) -> float:
     except ValueError:
         tension = -1.0
     if not 0.0 <= tension <= 1.0:
-        reader.fault(trajectory, f"tension '{text}', expected a number from 0 to 1")
-        return 0.0
+        raise reader.fault(trajectory, f"tension '{text}', expected a number from 0 to 1")
     return tension

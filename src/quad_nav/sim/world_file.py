@@ -39,6 +39,7 @@ MAX_BYTES = 64 * 1024 * 1024
 """Size of the world and of all files that it includes, each counted once."""
 
 _LONGEST_NAME = 200
+_NAMED = 10  # parts in one remark
 _SCHEME = "model://"
 _OTHER_SOLIDS = ("population", "road")
 
@@ -60,7 +61,6 @@ class _Findings:
     moving: List[MovingObstacle] = field(default_factory=list)
     left_out: Dict[str, List[str]] = field(default_factory=dict)
     not_static: List[str] = field(default_factory=list)
-    problems: List[str] = field(default_factory=list)
     files: Dict[Path, Element] = field(default_factory=dict)
     bytes_read: int = 0
     parts: int = 0
@@ -106,7 +106,7 @@ def load_world(path: Path, model_path: Sequence[Path] = ()) -> GazeboWorld:
     level up, and in the folders of ``model_path``.
 
     Raises:
-        InputError: A file has faults; lists all of them.
+        InputError: The file cannot be read, or is no world, or one of too many parts.
     """
     findings = _Findings()
     root = findings.read(path)
@@ -116,7 +116,7 @@ def load_world(path: Path, model_path: Sequence[Path] = ()) -> GazeboWorld:
     if len(worlds) > 1:
         raise InputError([f"{path}: line {worlds[1].line}: a second <world>, expected one"])
     folders = (path.parent, path.parent / "models", path.parent.parent / "models", *model_path)
-    walk = _Walk(SdfReader(path, findings.problems), findings, folders)
+    walk = _Walk(SdfReader(path), findings, folders)
     world = worlds[0] if worlds else root
     walk.models(world, IDENTITY, "", world.first("state"))
     for actor in world.all("actor"):
@@ -125,15 +125,14 @@ def load_world(path: Path, model_path: Sequence[Path] = ()) -> GazeboWorld:
         for element in world.all(tag):
             findings.leave_out(element.attributes.get("name", tag), tag)
     if len(findings.obstacles) > MAX_OBSTACLES:
-        findings.problems.append(
-            f"{path}: {len(findings.obstacles)} shapes, expected {MAX_OBSTACLES} at most"
-        )
-    if findings.problems:
-        raise InputError(findings.problems)
-    found = {f"left out, {reason}": names for reason, names in findings.left_out.items()}
+        shapes = len(findings.obstacles)
+        raise InputError([f"{path}: {shapes} shapes, expected {MAX_OBSTACLES} at most"])
+    found = {
+        f"{len(names)} left out, {reason}": names for reason, names in findings.left_out.items()
+    }
     if findings.not_static:
         found["not static in Gazebo, but fixed here"] = findings.not_static
-    remarks = tuple(f"{path}: {what}: {', '.join(names)}" for what, names in found.items())
+    remarks = tuple(f"{path}: {what}: {_listed(names)}" for what, names in found.items())
     return GazeboWorld(tuple(findings.obstacles), remarks, tuple(findings.moving))
 
 
@@ -164,7 +163,7 @@ class _Walk:
             person = actor_of(self.reader, actor, name)
             if isinstance(person, MovingObstacle):
                 self.findings.moving.append(person)
-            elif person is not None:
+            else:
                 self.findings.obstacles.append(person)
 
     def _model(
@@ -201,17 +200,14 @@ class _Walk:
         if uri == "model://sun":
             return
         if self.depth >= MAX_INCLUDES:
-            self.reader.fault(include, f"more than {MAX_INCLUDES} nested files")
-            return
+            raise self.reader.fault(include, f"more than {MAX_INCLUDES} nested files")
         path = find_model(uri, self.folders)
         if path is None:
             if uri == "model://ground_plane":
                 return
             raise NotRepresented(f"<include> of {uri or 'nothing'}, not found")
         root = self.findings.read(path)
-        walk = _Walk(
-            SdfReader(path, self.findings.problems), self.findings, self.folders, self.depth + 1
-        )
+        walk = _Walk(SdfReader(path), self.findings, self.folders, self.depth + 1)
         for model in root.all("model"):
             walk._model(model, map_from_parent, prefix, state, include)
 
@@ -240,6 +236,11 @@ class _Walk:
                 self.findings.obstacles.append(obstacle)
 
 
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return f"{', '.join(names[:_NAMED])}{more}"
+
+
 def _state_of(state: Optional[Element], tag: str, name: str) -> Optional[Element]:
     """Return the element of a model or link in a saved state."""
     if state is None:
@@ -257,8 +258,8 @@ def find_model(uri: str, folders: Sequence[Path]) -> Optional[Path]:
     """Return the SDF file of a model in the first folder that has it, None if none has.
 
     ``model://name`` is a folder. Its ``model.config`` names the file, or several, of which the one
-    with the highest version counts. Without ``model.config`` it is ``model.sdf``. URIs that lead
-    out of the folders are not found.
+    with the highest version counts. Without ``model.config``, or with one that is no XML, it is
+    ``model.sdf``. URIs that lead out of the folders are not found.
 
     Raises:
         InputError: A link or a ``model.config`` leads out of the folders.
@@ -281,12 +282,11 @@ def find_model(uri: str, folders: Sequence[Path]) -> Optional[Path]:
 
 def _sdf_in(folder: Path, folders: Sequence[Path]) -> Path:
     config = folder / "model.config"
-    if not config.exists():
-        return folder / "model.sdf"
-    named = [
-        (_version(sdf.attributes.get("version", "")), sdf.text.strip())
-        for sdf in read_xml(config).all("sdf")
-    ]
+    try:
+        files = list(read_xml(config).all("sdf")) if config.exists() else []
+    except InputError:  # many have an & in their descriptions; Gazebo's own reader goes on, too
+        files = []
+    named = [(_version(sdf.attributes.get("version", "")), sdf.text.strip()) for sdf in files]
     return referenced_file(folder, max(named)[1] if named else "model.sdf", folders)
 
 

@@ -15,7 +15,8 @@ from quad_nav.geometry import Twist2D
 from quad_nav.loop.inspection import GLOBAL_COSTMAP, PLAN
 from quad_nav.mission.goal_file import parse_goals
 from quad_nav.scenario.flight_setup import FlightOptions
-from quad_nav.scenario.preview import NO_PLAN, MissionPreview, RobotPreview
+from quad_nav.scenario.goal_plans import NO_PLAN
+from quad_nav.scenario.preview import MissionPreview, RobotPreview
 from quad_nav.sim.movers import Movers
 from quad_web.view import rows
 from quad_web.view.actions import Answer, GoalChange, GoalFileView

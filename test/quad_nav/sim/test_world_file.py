@@ -33,6 +33,9 @@ def model(
     )
 
 
+CASES = Path(__file__).parents[2] / "field_cases"
+
+
 def written(folder: Path, *content: str, name: str = "a.world") -> Path:
     path = folder / name
     path.write_text(f'<sdf version="1.6">\n<world name="w">\n{"".join(content)}\n</world></sdf>')
@@ -138,8 +141,8 @@ def test_a_scene_of_a_world_has_its_actors(tmp_path):
         ),
     ],
 )
-def test_faults_of_actors(tmp_path, script, problem):
-    assert faults(written(tmp_path, actor(script))) == [f"a.world: line 3: {problem}"]
+def test_an_actor_with_a_fault_is_left_out(tmp_path, script, problem):
+    assert remarks(tmp_path, actor(script)) == [f"1 left out, a.world: line 3: {problem}: ann"]
 
 
 def test_parts_below_the_floor_are_cut_off(tmp_path):
@@ -200,33 +203,33 @@ def test_ground_plane_and_sun_are_floor_and_light(tmp_path):
 @pytest.mark.parametrize(
     "content, remark",
     [
-        (model(BOX, "0 0 2 0.1 0 0"), "left out, tilted box: m/l/c"),
-        (model(CYLINDER, "0 0 2 0 1.5 0"), "left out, tilted cylinder: m/l/c"),
-        (model("<mesh><uri>a.dae</uri></mesh>"), "left out, mesh: m/l/c"),
-        (model("<a/>") + model("<a/>", name="n"), "left out, a: m/l/c, n/l/c"),
-        (model("<plane/>", "0 0 1 0 0 0"), "left out, plane that is not the floor: m/l/c"),
-        (model(BOX, "0 0 -1.5 0 0 0"), "left out, nothing above the floor: m/l/c"),
+        (model(BOX, "0 0 2 0.1 0 0"), "1 left out, tilted box: m/l/c"),
+        (model(CYLINDER, "0 0 2 0 1.5 0"), "1 left out, tilted cylinder: m/l/c"),
+        (model("<mesh><uri>a.dae</uri></mesh>"), "1 left out, mesh: m/l/c"),
+        (model("<a/>") + model("<a/>", name="n"), "2 left out, a: m/l/c, n/l/c"),
+        (model("<plane/>", "0 0 1 0 0 0"), "1 left out, plane that is not the floor: m/l/c"),
+        (model(BOX, "0 0 -1.5 0 0 0"), "1 left out, nothing above the floor: m/l/c"),
         (
             model(BOX, more='<pose relative_to="f">0 0 0 0 0 0</pose>'),
-            "left out, pose relative to a named frame: m/l/c",
+            "1 left out, pose relative to a named frame: m/l/c",
         ),
         (
             "<include><name>t</name><uri>model://table</uri></include>",
-            "left out, <include> of model://table, not found: t",
+            "1 left out, <include> of model://table, not found: t",
         ),
         (
             "<include><uri>model://../a</uri></include>",
-            "left out, <include> of model://../a, not found: a",
+            "1 left out, <include> of model://../a, not found: a",
         ),
         (
             '<model name="m"><static>1</static><link name="l"><visual name="v"/></link></model>',
-            "left out, looks without a collision: m/l",
+            "1 left out, looks without a collision: m/l",
         ),
         (
             '<actor name="walker"><plugin name="p" filename="p.so"/></actor>',
-            "left out, actor that a plugin moves: walker",
+            "1 left out, actor that a plugin moves: walker",
         ),
-        ('<road name="r"/>', "left out, road: r"),
+        ('<road name="r"/>', "1 left out, road: r"),
         (model(BOX, static="false"), "not static in Gazebo, but fixed here: m"),
     ],
 )
@@ -241,7 +244,7 @@ def test_a_saved_state_overrides_poses(tmp_path):
     )
     same(only(tmp_path, model(SPHERE), state), Sphere("m/l/c", 7.0, 8.0, 9.0, 0.5))
     scaled = state.replace("<pose>1", "<scale>2 2 2</scale><pose>1")
-    assert remarks(tmp_path, model(SPHERE), scaled) == ["left out, scaled in <state>: m"]
+    assert remarks(tmp_path, model(SPHERE), scaled) == ["1 left out, scaled in <state>: m"]
 
 
 def test_includes_are_found_beside_the_world_and_in_the_model_path(tmp_path, monkeypatch):
@@ -266,17 +269,17 @@ def test_includes_are_found_beside_the_world_and_in_the_model_path(tmp_path, mon
     assert load_scene(path).obstacles[0].radius_m == 0.75
 
 
-def test_a_model_that_includes_itself_is_refused(tmp_path):
+def test_a_model_that_includes_itself_is_left_out(tmp_path):
     include = "<include><uri>model://a.world</uri></include>"
     path = tmp_path / "a.world"
     path.write_text(f'<sdf>\n<model name="m">{include}</model></sdf>')
-    assert faults(path) == ["a.world: line 2: <include>: more than 16 nested files"]
+    remark, _ = load_world(path).remarks
+    assert "left out, a.world: line 2: <include>: more than 16 nested files: m/" in remark
 
 
 @pytest.mark.parametrize(
     "content, problem",
     [
-        ("<model>", "line 4, column 3: mismatched tag"),
         (
             model("<box><size>1 2</size></box>"),
             "line 3: <size>: '1 2', expected three numbers of metres",
@@ -287,6 +290,24 @@ def test_a_model_that_includes_itself_is_refused(tmp_path):
         ),
         (model("<sphere/>"), "line 3: <sphere>: <radius> is missing, expected a number of metres"),
         (model(SPHERE, "0 0 0 0 0"), "line 3: <pose>: '0 0 0 0 0', expected x y z roll pitch yaw"),
+        (
+            model(SPHERE, "1 1 343582.7 0 0 0"),
+            "line 3: <pose>: '1 1 343582.7 0 0 0', expected x y z roll pitch yaw, at most 100000",
+        ),
+    ],
+)
+def test_a_shape_with_a_fault_is_left_out_with_the_line(tmp_path, content, problem):
+    path = written(tmp_path, model(BOX, name="sound"), content)
+    world = load_world(path)
+    assert [one.name for one in world.obstacles] == ["sound/l/c"]
+    (remark,) = world.remarks
+    assert remark.startswith(f"{path}: 1 left out, a.world: {problem}: m")
+
+
+@pytest.mark.parametrize(
+    "content, problem",
+    [
+        ("<model>", "line 4, column 3: mismatched tag"),
         ("</world><world name='v'>", "line 3: a second <world>, expected one"),
     ],
 )
@@ -294,9 +315,28 @@ def test_faults_have_a_line(tmp_path, content, problem):
     assert faults(written(tmp_path, content)) == [f"a.world: {problem}"]
 
 
-def test_all_faults_are_listed_at_once(tmp_path):
-    path = written(tmp_path, model("<sphere/>"), "\n", model(SPHERE, "a"))
-    assert [fault.split(":")[1] for fault in faults(path)] == [" line 3", " line 4"]
+@pytest.mark.parametrize(
+    "case, obstacles, remark",
+    [
+        ("bad_pose", 3, "1 left out, room.world: line 4: <pose>: '1 1 343582.7 0 0 0'"),
+        ("bad_model_config", 4, "starts: not given"),
+    ],
+)
+def test_one_bad_detail_does_not_refuse_a_world(case, obstacles, remark):
+    scene = load_scene(CASES / case / "room.world")
+    assert len(scene.obstacles) == obstacles
+    assert any(remark in one for one in scene.remarks)
+
+
+def test_a_world_of_meshes_says_what_was_left_out():
+    with pytest.raises(InputError, match="4 left out, mesh: .*expected a scene with world, size"):
+        load_scene(CASES / "meshes_only" / "room.world")
+
+
+def test_blanks_before_the_declaration(tmp_path):
+    path = written(tmp_path, model(SPHERE))
+    path.write_text(f'\n <?xml version="1.0"?>{path.read_text()}')
+    assert len(load_world(path).obstacles) == 1
 
 
 def test_xml_bombs_are_refused(tmp_path):

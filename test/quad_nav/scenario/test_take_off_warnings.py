@@ -1,0 +1,48 @@
+"""What a flight tells before it takes off, on missions in ``test/field_cases``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from quad_nav.scenario.flight_setup import FlightOptions, read_setup
+from quad_nav.scenario.goal_plans import unreachable_goals
+from quad_nav.sim.obstacles import Box
+from quad_nav.sim.scene import Scene, Walls
+from quad_nav.sim.unseen import unseen_obstacles
+
+CASES = Path(__file__).parents[2] / "field_cases"
+
+
+def setup_of(case):
+    return read_setup(FlightOptions(CASES / case / "scene.yaml", CASES / case, "default"))
+
+
+def test_goals_without_a_plan_are_named():
+    lines = unreachable_goals(setup_of("goal_at_wall"))
+    assert [line.partition(": no path from the start")[0] for line in lines] == [
+        "quad0: goal 1 (7.69, 3)",
+        "quad0: goal 2 (7.65, 5.65)",
+        "quad0: goal 3 (4, 0.31)",
+    ]
+
+
+def test_a_table_that_the_lidar_misses_is_named():
+    """Its top is from 0.985 to 1.015 m, the LIDAR at 1.06 m, the hull from 0.94 to 1.18 m."""
+    (line,) = [one for one in setup_of("unseen_table").warnings if "LIDAR" in one]
+    assert "altitude 1 m: quadcopters touch table_top, which their LIDARs do not see" in line
+    assert line.endswith("expected an altitude of 0.80 m or 1.10 m")
+
+
+def scene_with(*heights):
+    boxes = [Box(f"b{k}", 2.0, 2.0, 1.0, 1.0, top - low, 0.0, low) for k, (low, top) in heights]
+    return Scene("room", 8.0, 6.0, 1.0, Walls(), tuple(boxes), ())
+
+
+def test_what_is_seen_or_not_touched_is_no_caution():
+    assert unseen_obstacles(scene_with(*enumerate([(0.0, 1.07), (0.0, 0.93), (1.19, 3.0)]))) == []
+
+
+def test_where_no_altitude_is_free():
+    shelf = [(0.1 * k, 0.1 * k + 0.02) for k in range(32)]
+    (line,) = unseen_obstacles(scene_with(*enumerate(shelf)))
+    assert line.endswith("no altitude is better")
