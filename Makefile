@@ -9,7 +9,7 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance replay-vehicles fly-vehicles replay-airframe fuzz bench bench-compare bench-fleets packages venv workspace clean distclean
+.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance replay-vehicles fly-vehicles replay-airframe fuzz bench bench-compare bench-fleets packages core venv workspace clean distclean
 
 help:  ## List the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -27,7 +27,7 @@ fly: workspace  ## Fly the mission: make fly ARGS="config:=tutorial rate:=2"
 test: workspace unit unit38 web lint docs rostest first-hour  ## Run every test and static check
 	@echo "quad: all tests passed"
 
-unit: workspace  ## The unit tests
+unit: venv workspace  ## The unit tests
 	@scripts/make_venv .venv requirements-test.txt requirements-web.txt
 	$(PYTHON) -m pytest -n auto --dist loadfile
 
@@ -111,11 +111,15 @@ bench-fleets: venv  ## Whether fleets get through without touching: make bench-f
 packages:  ## Install the system packages
 	@scripts/install_packages $(if $(and $(DISPLAY),$(filter fly,$(MAKECMDGOALS))),--rviz)
 
-venv: packages  ## Make the virtual environment, with the command .venv/bin/quad
-	@scripts/make_venv .venv requirements.txt requirements-tune.txt
+# All that the core needs, and so `make fly`.
+core: packages
+	@scripts/make_venv .venv requirements.txt
 	@scripts/make_command .venv
 
-workspace: venv  ## Build the catkin workspace
+venv: core  ## Make the virtual environment, with the command .venv/bin/quad
+	@scripts/make_venv .venv requirements-tune.txt
+
+workspace: core  ## Build the catkin workspace
 	@scripts/build_workspace
 
 clean:  ## Remove what was built, but not the virtual environments
