@@ -307,7 +307,9 @@ def test_bad_input_ends_with_2_and_ctrl_c_with_130_and_what_was_flown(tmp_path, 
 
 def test_without_a_flight_there_are_no_statistics(tmp_path):
     setup = setup_of(write_worlds(tmp_path / "w.npz", w6=free()))
-    assert Results(setup.contestant, (), 1, 0.0).rows == []
+    results = Results(setup.contestant, (), 1, 0.0)
+    assert results.rows == []
+    assert results.to_csv().startswith("world,run,seed,outcome,time_s,")
     with pytest.raises(ValueError, match="no runs"):
         barn_statistics([])
 

@@ -192,6 +192,8 @@ def test_results_as_text_json_and_csv():
     assert figures["figures"][0]["successes"] == 2 and figures["runs"][2]["contacts"]
     json.dumps(figures, allow_nan=False)
     assert len(to_csv(results).splitlines()) == 5
+    header = to_csv(replace(results, runs=()))
+    assert to_csv(results).startswith(header) and header.startswith("robots,radius_m,method,")
 
 
 @needs_orca

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import math
 from dataclasses import replace
@@ -30,6 +31,9 @@ from quad_nav.errors import InputError
 from quad_nav.sim.movers import Movers
 
 WALL = [[-10.0, 0.0, 0.5, 20.0, 0.0]]
+needs_moving = pytest.mark.skipif(
+    importlib.util.find_spec("quad_moving") is None, reason="flies with config/moving"
+)
 ASIDE = ([0.0, 10.0], [[0.0, 8.0], [2.0, 8.0]])  # far from the straight way
 
 
@@ -126,6 +130,7 @@ def test_the_speed_limit(worlds, given, limit):
     assert setup.contestant.simulation.flight.max_speed_mps == limit
 
 
+@needs_moving
 @pytest.mark.parametrize("given, speed, body", [(None, 0.0, 0.5), (0.4, 0.4, 0.5), (0.9, 0.9, 0.9)])
 def test_evasions_keep_to_the_speed_limit_unless_another_one_is_set(worlds, given, speed, body):
     """`config/moving` evades at up to 2 m/s."""
@@ -199,6 +204,7 @@ def test_results_by_difficulty(worlds):
     assert len(results.to_csv().splitlines()) == 4
 
 
+@needs_moving
 def test_the_command(worlds, tmp_path):
     out = tmp_path / "out.json"
     given = ["--worlds", str(worlds), "--only", "3", "--workers", "1", "--json", str(out), "-q"]

@@ -21,6 +21,7 @@ from quad_web.offline.view import WebView
 from quad_web.replay.recorded_flight import SHOWN_FOR_S, RecordedFlight
 from quad_web.view.state import Wanted
 
+pytest.importorskip("quad_moving")
 ROOT = Path(__file__).resolve().parents[2]
 LAYER = Wanted(frozenset({"track"}), 0)
 SPEED_MPS, RADIUS_M = 1.0, 0.3

@@ -32,7 +32,6 @@ from quad_web.view.items import (
     body_row,
     costmap_item,
     line_item,
-    moving_solids,
     poses_item,
     robots_item,
     scan_item,
@@ -291,7 +290,7 @@ def test_clearance_is_also_that_to_moving_obstacles():
     """The person's centre is 0.9 m away: less its radius of 0.25 m and the robot's of 0.3 m."""
     poses = np.zeros((1, 9))
     poses[0, :2] = [2.0, 6.0]
-    moving = moving_solids(STREET, [(math.nan, math.nan, math.nan), (2.0, 6.9, 0.0)])
+    moving = STREET.moving_solids([(math.nan, math.nan, math.nan), (2.0, 6.9, 0.0)])
     assert [solid.name for solid in moving] == ["person_0"]
     item = samples_item(3.0, poses, 0.3, STREET, moving)
     assert item.arrays["values"][0, 1] == pytest.approx(0.35)

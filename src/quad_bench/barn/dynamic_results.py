@@ -58,6 +58,10 @@ class DynamicResults(Results):
         }
 
     _LAST_COLUMN = "published\nDWA (%)"
+    _RUN_COLUMNS = (
+        "world run seed outcome time_s path_length_m min_clearance_m recoveries"
+        " gave_up touched difficulty phase_s waited_s touched_x_m touched_y_m"
+    )
 
     def _last_cell(self, name: str, row: BarnStatistics) -> str:
         return f"{100 * PUBLISHED[name]:.0f}" if name in PUBLISHED else ""

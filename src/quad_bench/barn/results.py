@@ -115,9 +115,8 @@ class Results:
         }
 
     def to_csv(self) -> str:
-        """Return a row for each run."""
-        rows = [self._run_row(run) for run in self.runs]
-        return csv_text(rows, list(rows[0]) if rows else [])
+        """Return a row for each run, below a header."""
+        return csv_text([self._run_row(run) for run in self.runs], self._RUN_COLUMNS.split())
 
     def _table(self, rows: Sequence[Tuple[str, BarnStatistics]]) -> str:
         return table(
@@ -126,6 +125,10 @@ class Results:
         )
 
     _LAST_COLUMN = "metric"
+    _RUN_COLUMNS = (
+        "world run seed outcome time_s metric path_length_m min_clearance_m recoveries"
+        " gave_up touched touched_x_m touched_y_m"
+    )
 
     def _last_cell(self, name: str, row: BarnStatistics) -> str:
         return f"{row.metric:.3f}"

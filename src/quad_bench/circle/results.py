@@ -154,9 +154,8 @@ def to_json(results: CircleResults) -> Dict[str, Any]:
 
 
 def to_csv(results: CircleResults) -> str:
-    """Return a row for each run."""
-    rows = [_run_row(run) for run in results.runs]
-    return csv_text(rows, list(rows[0]) if rows else [])
+    """Return a row for each run, below a header."""
+    return csv_text([_run_row(run) for run in results.runs], _RUN_COLUMNS)
 
 
 def _row(robots: int, radius_m: float, method: str, row: CircleStatistics) -> List[str]:
@@ -192,10 +191,14 @@ def _rounded(values: Dict[str, Any]) -> Dict[str, Any]:
     }
 
 
+_RUN_COLUMNS = (
+    *("robots", "radius_m", "method", "run", "seed", "succeeded", "arrived", "contacts"),
+    *("mean_arrival_s", "last_arrival_s", "detour", "gap_m", "sim_time_s"),
+)
+
+
 def _run_row(run: CircleRun) -> Dict[str, Any]:
-    names = ["robots", "radius_m", "method", "run", "seed", "succeeded", "arrived", "contacts"]
-    names += ["mean_arrival_s", "last_arrival_s", "detour", "gap_m", "sim_time_s"]
-    values = {name: getattr(run, name) for name in names}
+    values = {name: getattr(run, name) for name in _RUN_COLUMNS}
     return _rounded({**values, "contacts": len(run.contacts)})
 
 

@@ -166,9 +166,7 @@ class Movers:
 
     def at(self, now_s: float) -> List[Obstacle]:
         """Return the obstacles where they are at a time, without those of which it is unknown."""
-        poses = self.poses(now_s)
-        known = np.isfinite(poses[:, 0])
-        return [shape.placed(pose) for shape, pose, at in zip(self.shapes, poses, known) if at]
+        return self._scene.moving_solids(self.poses(now_s))
 
 
 def phases_s(motions: Sequence[Motion], common_s: Optional[float], seed: int) -> List[float]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Dict, List, Optional, Sequence, Tuple, Type
+from typing import Dict, Iterable, List, Optional, Sequence, Tuple, Type
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,6 +143,11 @@ class Scene:
                 for k in range(self.walkers.count)
             )
         return (*(obstacle.shape for obstacle in self.moving), *people)
+
+    def moving_solids(self, poses: Iterable[Sequence[float]]) -> List[Obstacle]:
+        """Return ``moving_shapes`` at poses (x_m, y_m, yaw_rad); those with NaN are left out."""
+        placed = zip(self.moving_shapes, poses)
+        return [shape.placed(pose) for shape, pose in placed if np.isfinite(pose).all()]
 
     @property
     def walker_rows(self) -> slice:

@@ -31,7 +31,6 @@ from quad_web.view.items import (
     Trails,
     costmap_item,
     line_item,
-    moving_solids,
     poses_item,
     robots_item,
     scan_item,
@@ -138,7 +137,7 @@ class FlightItems:
             poses.arrays["pose"],
             setup.robot_radius_m,
             setup.scene,
-            moving_solids(setup.scene, moving),
+            setup.scene.moving_solids(moving),
             cycles_s,
         )
         now = {view.robot: self._robot_now(view, actions) for view in views}

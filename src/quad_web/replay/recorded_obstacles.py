@@ -13,7 +13,7 @@ from quad_nav.sim.obstacles import Obstacle
 from quad_nav.sim.scene import Scene
 from quad_nav.topics.obstacle_poses import POSES_TOPIC, moving_poses
 from quad_web.replay.recording_index import RecordingIndex
-from quad_web.view.items import ObstacleItems, moving_solids
+from quad_web.view.items import ObstacleItems
 from quad_web.view.state import Item
 
 Floats = NDArray[np.float64]
@@ -74,4 +74,4 @@ class ObstacleTrack:
 
     def solids(self, time_s: float) -> List[Obstacle]:
         """Return the obstacles where they are, without those of which it is unknown."""
-        return [] if self._scene is None else moving_solids(self._scene, self.poses(time_s))
+        return [] if self._scene is None else self._scene.moving_solids(self.poses(time_s))

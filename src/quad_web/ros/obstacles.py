@@ -13,7 +13,7 @@ from quad_nav.sim.obstacles import Obstacle
 from quad_nav.sim.scene import Scene
 from quad_nav.topics.obstacle_poses import POSES_TOPIC, moving_poses
 from quad_web.ros.intake import Newest, Topic
-from quad_web.view.items import ObstacleItems, moving_solids
+from quad_web.view.items import ObstacleItems
 from quad_web.view.state import Item
 
 _NO_POSES: NDArray[np.float64] = np.zeros((0, 3))
@@ -60,4 +60,4 @@ class Obstacles:
         """Return the obstacles where they are; none before the first message."""
         if self._scene is None or not len(self._poses):
             return []
-        return moving_solids(self._scene, self._poses)
+        return self._scene.moving_solids(self._poses)

@@ -86,12 +86,6 @@ class ObstacleItems:
         return [Item("obstacles", None, {"poses": shown})]
 
 
-def moving_solids(scene: Scene, poses: Any) -> List[Obstacle]:
-    """Return the moving obstacles at poses float[m, 3]; those with NaN are left out."""
-    known = np.isfinite(np.asarray(poses, np.float64)).all(axis=1)
-    return [shape.placed(pose) for shape, pose, at in zip(scene.moving_shapes, poses, known) if at]
-
-
 def robots_item(
     names: Sequence[str],
     radius_m: float,
