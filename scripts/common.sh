@@ -4,11 +4,11 @@ fail() { printf 'quad: %s\n' "$*" >&2; exit 1; }
 
 checkout=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
 
-# Scripts of catkin and of a virtual environment have the path in their first line or in lists.
+# The path is in the first line of the nodes, which has no quotes, and in lists such as PATH.
 case $checkout in
 *[[:space:]:\;\"\'\$\\]*) fail "$checkout: a path with a space, a quote or one of : ; \$ \\ in it," \
-    "which neither catkin nor a virtual environment survives; move the checkout to another folder," \
-    "or install quad without ROS: pip install ." ;;
+    "which the first lines of scripts and lists of paths do not survive; move the checkout to" \
+    "another folder, or install quad without ROS: pip install ." ;;
 esac
 
 # lock FOLDER: set-ups that work there take turns. Without flock (macOS), or where the file system has

@@ -13,8 +13,10 @@ import functools
 import hashlib
 import os
 import re
+import shutil
+import tempfile
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Callable, Iterator, List, Optional, Set, Tuple
 
@@ -24,10 +26,7 @@ from quad_nav.files.cache_folder import require_writable, user_cache_folder
 
 COMPILE_S = 60
 """Wall time, about, in which one core compiles the kernels of a flight."""
-COMPILING = (
-    "compiling kernels with numba, once after an installation or a change of the sources: takes "
-    f"about {COMPILE_S} s on one core"
-)
+COMPILING = f"compiling kernels with numba, once after an installation: {COMPILE_S} s on one core"
 _LONG_S = 3.0  # loading the cache takes less
 _THIS = Path(__file__).resolve()  # no part of a kernel
 SOURCES = _THIS.parents[2]
@@ -39,11 +38,12 @@ def find_cache_folder() -> Tuple[Optional[Path], List[str]]:
     """Return the folder for compiled kernels, None if none can be written, and why not others.
 
     The first of: ``NUMBA_CACHE_DIR``; ``__pycache__`` beside the sources, with the trust that the
-    sources have; a folder of this user.
+    sources have; a folder of this user, with a copy of what is compiled beside the sources.
     """
     given = os.environ.get("NUMBA_CACHE_DIR", "")
     problems = []
-    for folder in ([Path(given)] if given else []) + [_PACKAGE / "__pycache__" / "kernels"]:
+    beside = _PACKAGE / "__pycache__" / "kernels"
+    for folder in ([Path(given)] if given else []) + [beside]:
         try:
             os.makedirs(folder, exist_ok=True)
             require_writable(folder)
@@ -53,7 +53,18 @@ def find_cache_folder() -> Tuple[Optional[Path], List[str]]:
             return folder, problems
     name = hashlib.sha256(os.fsencode(_PACKAGE)).hexdigest()[:12]  # of this installation
     own, others = user_cache_folder(name)
+    if own is not None and not given:
+        _copy_kernels(beside, own)
     return own, problems + others
+
+
+def _copy_kernels(source: Path, target: Path) -> None:
+    """Copy each folder of kernels that is not there yet; other processes may do the same."""
+    for folder in source.glob("*"):
+        if not (target / folder.name).exists():
+            with suppress(OSError), tempfile.TemporaryDirectory(dir=target) as part:
+                copy = shutil.copytree(folder, Path(part) / folder.name)
+                os.rename(copy, target / folder.name)
 
 
 FOLDER, PROBLEMS = find_cache_folder()

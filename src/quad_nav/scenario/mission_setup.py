@@ -44,7 +44,7 @@ DEFAULTS: Dict[str, Any] = {
     "simulation": True,
     "start_service": "",  # called before the first goal; the simulator's with `simulation`
     "end_service": "",  # called after the last goal, before the node exits
-    "ready_timeout": 60.0,
+    "ready_timeout": 180.0,  # kernels may have to be compiled first, in each process
     "exit_when_done": False,
     "result": "",
     "resume": False,

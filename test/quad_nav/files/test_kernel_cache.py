@@ -177,6 +177,28 @@ def test_read_only_sources_and_no_home_use_the_temporary_folder(places, monkeypa
     assert not (places / "nonexistent").exists()
 
 
+def test_kernels_beside_sources_of_another_user_are_copied(places, monkeypatch):
+    kernels = places / "sources" / "__pycache__" / "kernels"
+    for name in ("old", "new"):
+        (kernels / name / "of_quad_nav").mkdir(parents=True)
+        (kernels / name / "of_quad_nav" / "kernel.nbi").write_text(name)
+    monkeypatch.setattr(kernel_cache, "_PACKAGE", places / "sources")
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+
+    def require(folder):
+        if folder == kernels:
+            raise OSError(13, "Permission denied")
+
+    monkeypatch.setattr(kernel_cache, "require_writable", require)
+    own, _ = kernel_cache.find_cache_folder()
+    assert own.parent == temporary(places)
+    assert (own / "new" / "of_quad_nav" / "kernel.nbi").read_text() == "new"
+    (own / "old" / "of_quad_nav" / "kernel.nbi").write_text("compiled here")
+    assert kernel_cache.find_cache_folder()[0] == own
+    assert (own / "old" / "of_quad_nav" / "kernel.nbi").read_text() == "compiled here"
+    assert sorted(path.name for path in own.iterdir()) == ["new", "old"]
+
+
 def test_home_and_xdg_come_before_the_temporary_folder(places, monkeypatch):
     (places / "home").mkdir()
     monkeypatch.setenv("HOME", str(places / "home"))

@@ -30,7 +30,7 @@ from std_srvs.srv import (
 from visualization_msgs.msg import Marker, MarkerArray
 
 from quad_nav.errors import InputError, printable
-from quad_nav.files.kernel_cache import cache_warnings
+from quad_nav.files.kernel_cache import COMPILING, announced, cache_warnings
 from quad_nav.files.values import is_number
 from quad_nav.loop.flight_loop import STEPS_PER_ODOMETRY
 from quad_nav.parameter import Parameter
@@ -49,6 +49,7 @@ from quad_nav.scenario.simulator_setup import (
     asked_for_by_navigators,
     read_setup,
 )
+from quad_nav.scenario.warm_up import simulate
 from quad_nav.sim.body import GoalSphere
 from quad_nav.sim.pacing import Pacer, RateMeter
 from quad_nav.sim.simulation_params import FASTEST_RATE, STEP_S, STEPS_PER_S
@@ -336,6 +337,8 @@ def main() -> int:
             " use the wall clock"
         )
     try:
+        with announced(lambda: rospy.loginfo("%s", COMPILING)):
+            simulate()
         prepare(setup.configurations.values())
         node = SimulatorNode(setup, own)
     except InputError as error:
