@@ -65,7 +65,7 @@ first-hour: venv workspace  ## What a user does first: an own scene, map, robot,
 # Not in `make test`: Ray is an extra, 70 MB. The cluster is on this machine.
 ray:  ## The tests with a Ray cluster, in an environment of their own
 	@scripts/install_packages --venv
-	@scripts/make_venv .venv-ray requirements.txt requirements-tune.txt requirements-test.txt
+	@scripts/make_venv .venv-ray requirements.txt requirements-report.txt requirements-tune.txt requirements-test.txt
 	@.venv-ray/bin/python3 -m pip install --quiet '.[ray]'
 	PYTHONPATH=src .venv-ray/bin/python3 -m pytest test/ray
 
@@ -120,7 +120,7 @@ flight-venv:
 	@scripts/make_command .venv
 
 venv: flight-venv  ## Make the virtual environment, with the command .venv/bin/quad; needs no ROS
-	@scripts/make_venv .venv requirements-tune.txt
+	@scripts/make_venv .venv requirements-report.txt requirements-tune.txt
 
 workspace: packages flight-venv  ## Build the catkin workspace
 	@scripts/build_workspace
