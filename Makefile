@@ -9,7 +9,7 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance replay-vehicles fly-vehicles replay-airframe fuzz bench bench-compare bench-fleets packages flight-venv venv workspace clean distclean
+.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance replay-vehicles fly-vehicles replay-airframe fuzz bench bench-compare bench-fleets debian12 debian13 packages flight-venv venv workspace clean distclean
 
 help:  ## List the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -65,7 +65,7 @@ first-hour: venv workspace  ## What a user does first: an own scene, map, robot,
 # Not in `make test`: Ray is an extra, 70 MB. The cluster is on this machine.
 ray:  ## The tests with a Ray cluster, in an environment of their own
 	@scripts/install_packages --venv
-	@scripts/make_venv .venv-ray requirements.txt requirements-tune.txt requirements-test.txt
+	@scripts/make_venv .venv-ray requirements.txt requirements-report.txt requirements-tune.txt requirements-test.txt
 	@.venv-ray/bin/python3 -m pip install --quiet '.[ray]'
 	PYTHONPATH=src .venv-ray/bin/python3 -m pytest test/ray
 
@@ -110,6 +110,12 @@ bench-compare: venv  ## What got slower between two runs: make bench-compare A=b
 bench-fleets: venv  ## Whether fleets get through without touching: make bench-fleets ARGS="swap 8in12"
 	PYTHONPATH=src $(PYTHON) bench/encounters.py $(ARGS)
 
+debian12:  ## Fly on a bare Debian 12 in a chroot; needs root, 3 GB and minutes
+	@scripts/debian bookworm $(TESTS)
+
+debian13:  ## The same on Debian 13, then make unit: make debian13 TESTS=unit
+	@scripts/debian trixie $(TESTS)
+
 packages:  ## Install the system packages
 	@scripts/install_packages $(if $(and $(DISPLAY),$(filter fly,$(MAKECMDGOALS))),--rviz)
 
@@ -120,7 +126,7 @@ flight-venv:
 	@scripts/make_command .venv
 
 venv: flight-venv  ## Make the virtual environment, with the command .venv/bin/quad; needs no ROS
-	@scripts/make_venv .venv requirements-tune.txt
+	@scripts/make_venv .venv requirements-report.txt requirements-tune.txt
 
 workspace: packages flight-venv  ## Build the catkin workspace
 	@scripts/build_workspace

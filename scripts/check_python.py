@@ -1,10 +1,13 @@
 """Refuse a Python that quad does not support before anything is compiled or installed.
 
-setup.py and make_venv run this file. It is plain enough for any Python, so that an old one says the
-same. The supported versions are those of ``requires-python`` in ``pyproject.toml``.
+setup.py, install_packages and make_venv run this file. It is plain enough for any Python, so that
+an old one says the same. The versions are those of ``requires-python`` in ``pyproject.toml``.
+pip would compile a physics engine without a wheel in silence: that is refused as well, unless
+``QUAD_COMPILE`` is set.
 """
 
 import os
+import platform
 import re
 import sys
 
@@ -28,19 +31,41 @@ def refusal(version, executable):
         "quad: Python %d.%d at %s: expected Python %d.%d to %d.%d; for other versions there are no "
         "wheels of the physics engine, pybullet, and compiling it takes a quarter of an hour.\n"
         "Install quad with another Python, from its checkout:\n"
-        "    uv tool install --python 3.11 .  # or try it: uvx --python 3.11 --from . quad fly\n"
+        "    uv tool install --python 3.11 .    # or uvx --python 3.11 --from . quad fly\n"
         "    conda create --name quad python=3.11 && conda activate quad && pip install .\n"
         "    QUAD_PYTHON=python3.11 make venv\n"
-        "With ROS, whose modules are the system's Python's: Debian 12 or 13, or a container:\n"
+        "Flying with ROS takes the system's Python: use Debian 12 or 13, or a container:\n"
         "    docker build --tag quad ."
     ) % (version[0], version[1], executable, first[0], first[1], end[0], end[1] - 1)
 
 
+def has_wheel(version, system, machine):
+    """Return whether the physics engine has a wheel for a Python of this version."""
+    first = {
+        ("linux", "x86_64"): (3, 8),
+        ("darwin", "arm64"): (3, 10),
+        ("darwin", "x86_64"): (3, 11),
+        ("win32", "amd64"): (3, 10),
+    }.get((system, machine.lower()))
+    end = (3, 13) if (system, machine) == ("darwin", "x86_64") else (3, 14)
+    return first is not None and first <= tuple(version[:2]) < end
+
+
 def main():
-    """End the process with the reason if its Python cannot be used."""
+    """End the process with the reason if its Python cannot be used, or only with a compiler."""
     reason = refusal(sys.version_info, sys.executable)
     if reason:
         sys.exit(reason)
+    if os.environ.get("QUAD_COMPILE") or has_wheel(
+        sys.version_info, sys.platform, platform.machine()
+    ):
+        return
+    sys.exit(
+        "quad: the physics engine, pybullet, has no wheel for Python %d.%d on %s, %s. Compiling it"
+        " takes a C++ compiler and a quarter of an hour; to do so, set the environment variable"
+        " QUAD_COMPILE=1."
+        % (sys.version_info[0], sys.version_info[1], platform.system(), platform.machine())
+    )
 
 
 if __name__ == "__main__":

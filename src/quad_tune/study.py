@@ -7,7 +7,6 @@ rejected before anything flies.
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import sqlite3
@@ -21,6 +20,7 @@ from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, TrialState
 
 from quad_nav.errors import InputError
+from quad_nav.files import system
 from quad_nav.files.output import make_folder
 from quad_nav.files.values import is_number, is_whole
 from quad_tune.courses import identity_text
@@ -106,7 +106,7 @@ def open_study(
 def _take(lock: int, folder: Path) -> None:
     """Lock the study; the lock ends with the process."""
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        system.lock(lock)
     except BlockingIOError as error:
         raise InputError(
             [

@@ -10,12 +10,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 from quad_nav.versions import versions
 
 ROOT = Path(__file__).resolve().parents[2]
 CHECK = ROOT / "scripts" / "check_python.py"
-refusal = runpy.run_path(str(CHECK))["refusal"]
+refusal, has_wheel = map(runpy.run_path(str(CHECK)).get, ("refusal", "has_wheel"))
 
 
 @pytest.mark.parametrize("minor", range(8, 14))
@@ -65,11 +66,48 @@ def test_environment_and_build_refuse_before_they_do_anything(command, newer_pyt
     assert {path for path in folder.iterdir() if path.name != "__pycache__"} == before
 
 
-def test_requirements_have_an_engine_for_every_python():
-    """pybullet and its fork install the same module, so that one of them is required."""
-    text = (ROOT / "requirements.txt").read_text(encoding="utf-8")
-    assert re.search(r'^pybullet>=\S+; python_version < "3.12"$', text, re.M)
-    assert re.search(r'^pybullet-arm64>=\S+; python_version >= "3.12"$', text, re.M)
+# Recorded: pip download --only-binary=:all: --no-deps --python-version 3.N --platform TAG ENGINE,
+# with the tags manylinux2014_x86_64 and manylinux_2_28_x86_64, manylinux2014_aarch64 and
+# manylinux_2_28_aarch64, macosx_14_0_arm64, macosx_14_0_x86_64, win_amd64, win_arm64.
+WHEELS = {
+    ("pybullet", "linux", "x86_64"): {8, 9, 10, 11},
+    ("pybullet-arm64", "linux", "x86_64"): {10, 11, 12, 13},
+    ("pybullet-arm64", "darwin", "arm64"): {10, 11, 12, 13},
+    ("pybullet-arm64", "darwin", "x86_64"): {11, 12},
+    ("pybullet-arm64", "win32", "AMD64"): {10, 11, 12, 13},
+}
+SYSTEMS = {
+    "linux": ("x86_64", "aarch64"),
+    "darwin": ("arm64", "x86_64"),
+    "win32": ("AMD64", "ARM64"),
+}
+
+
+@pytest.mark.parametrize("minor", range(8, 14))
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_every_python_has_one_engine_and_its_wheel_where_there_is_one(system, minor):
+    """pybullet and its fork install the same module."""
+    where = {"sys_platform": system, "python_version": f"3.{minor}"}
+    lines = (ROOT / "requirements.txt").read_text(encoding="utf-8").splitlines()
+    wanted = [Requirement(line) for line in lines if line.startswith("pybullet")]
+    (engine,) = [one.name for one in wanted if one.marker.evaluate(where)]
+    for machine in SYSTEMS[system]:
+        is_there = minor in WHEELS.get((engine, system, machine), ())
+        of_any = any(
+            minor in pythons for (_, *at), pythons in WHEELS.items() if at == [system, machine]
+        )
+        assert is_there == of_any == has_wheel((3, minor), system, machine)
+
+
+@pytest.mark.parametrize("compile, status", [("", 1), ("1", 0)])
+def test_an_engine_without_wheel_is_compiled_only_if_asked(compile, status, tmp_path):
+    (tmp_path / "sitecustomize.py").write_text("import platform; platform.machine = lambda: 'm68k'")
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "QUAD_COMPILE": compile}
+    done = subprocess.run(
+        [sys.executable, str(CHECK)], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == status
+    assert ("QUAD_COMPILE=1" in done.stderr) == (status == 1)
 
 
 def test_versions_name_the_engine_by_its_module():

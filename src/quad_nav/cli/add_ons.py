@@ -7,7 +7,12 @@ from typing import Any, Dict
 
 import click
 
-EXTRAS: Dict[str, str] = {"quad_bench": "", "quad_tune": "[tune]", "quad_web": "[web]"}
+EXTRAS: Dict[str, str] = {
+    "quad_nav": "",
+    "quad_bench": "",
+    "quad_tune": "[tune]",
+    "quad_web": "[web]",
+}
 """Package with commands -> extra of pip that installs what it needs, "" for none."""
 
 
@@ -27,5 +32,5 @@ def load(module: str, wanted: str) -> Any:
         package = missing if missing in EXTRAS else module.partition(".")[0]
         raise click.ClickException(
             f"{wanted}: {missing} is not installed; expected it from "
-            f"pip install 'quad-nav{EXTRAS[package]}'"
+            f"pip install 'quad-nav{EXTRAS[package]}', or in a checkout from make venv"
         ) from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Iterator, Tuple
 
+from quad_nav.cli import add_ons
 from quad_nav.cli.outputs import Outputs
 from quad_nav.errors import InputError
 from quad_nav.mission.summary import MissionSummary
@@ -28,6 +29,8 @@ class FlightPictures:
         self._observer = TraceObserver(
             f"{setup.scene.name}, {count} quadcopter{'s' * (count > 1)}, {setup.config_name}"
         )
+        if self.observers:
+            add_ons.load("quad_nav.report.page", "reports")
         animation = outputs.path("--animate")
         if animation is not None:
             from quad_nav.report.animation import animation_faults

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from quad_nav.cli import add_ons
 from quad_nav.cli.fly import fly
 from quad_nav.cli.options import A_FILE
 
@@ -40,7 +41,7 @@ def preview(**given: Any) -> None:
     refuses it; what can be shown is shown. With --edit 0 after Ctrl-C.
     """
     # Imported here: the engine and matplotlib load slowly, and --help does not need them.
-    from quad_nav.cli.mission_preview import show_mission
+    show_mission = add_ons.load("quad_nav.cli.mission_preview", "quad preview").show_mission
 
     show_mission(**given)
 

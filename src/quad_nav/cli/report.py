@@ -12,7 +12,7 @@ import click
 from rich.console import Console
 from rich.progress import track
 
-from quad_nav.cli import EXIT_BAD_INPUT, EXIT_SUCCESS
+from quad_nav.cli import EXIT_BAD_INPUT, EXIT_SUCCESS, add_ons
 from quad_nav.cli.options import echo, echo_lines
 from quad_nav.cli.outputs import Outputs
 from quad_nav.errors import InputError
@@ -59,7 +59,8 @@ def report(
     Exit status: 0, 1 if something cannot be written, 2 for invalid input.
     """
     # Imported here, because matplotlib loads slowly.
-    from quad_nav.report import animation, page
+    page = add_ons.load("quad_nav.report.page", "quad report")
+    from quad_nav.report import animation
     from quad_nav.report.compared_flight import compared_flight
     from quad_nav.report.comparison import comparison_page
     from quad_nav.report.flight_page import flight_page

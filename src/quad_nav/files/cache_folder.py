@@ -13,6 +13,8 @@ import tempfile
 from pathlib import Path
 from typing import Iterator, List, Optional, Tuple
 
+from quad_nav.files.system import user_number
+
 _OPEN_TO_OTHERS = 0o077
 _NAME = "quad-nav"
 
@@ -58,7 +60,7 @@ def _places() -> Iterator[Path]:
     elif home.is_absolute():
         yield home / ".cache" / _NAME
     try:
-        yield Path(tempfile.gettempdir()) / f"{_NAME}-{os.geteuid()}"
+        yield Path(tempfile.gettempdir()) / f"{_NAME}-{user_number()}"
     except FileNotFoundError:
         return  # no folder for temporary files can be written
 
@@ -78,20 +80,23 @@ def _make_private(folder: Path) -> None:
         folder.mkdir(mode=0o700)
     except FileExistsError:
         pass
+    user = user_number()
+    if user is None:  # Windows, where the folders of a user are private
+        return
     found = folder.lstat()
     if not stat.S_ISDIR(found.st_mode):
         raise OSError(None, "is no folder")
-    if found.st_uid != os.geteuid():
+    if found.st_uid != user:
         raise OSError(None, f"belongs to user {found.st_uid}, not to this user")
     if found.st_mode & _OPEN_TO_OTHERS:
         raise OSError(None, "is open to other users; expected the mode 0700")
     for above in folder.resolve().parents:
-        if _is_replaceable(above.stat()):
+        if _is_replaceable(above.stat(), user):
             raise OSError(None, f"is below {above}, where other users can replace it")
 
 
-def _is_replaceable(above: os.stat_result) -> bool:
+def _is_replaceable(above: os.stat_result, user: int) -> bool:
     """True if others than this user and root can rename what is in a folder."""
-    if above.st_uid not in (0, os.geteuid()):
+    if above.st_uid not in (0, user):
         return True
     return bool(above.st_mode & stat.S_IWOTH) and not above.st_mode & stat.S_ISVTX

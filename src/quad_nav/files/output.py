@@ -13,6 +13,8 @@ import stat
 from pathlib import Path
 from typing import Iterator, List
 
+from quad_nav.files.system import AT_ONCE, OPEN_FLAGS
+
 _PROBE = bytes(4096)  # a block: on a full disk an empty file can still be made
 _LONGEST_STEM = 200  # characters of the name that the partial file's name has
 
@@ -116,8 +118,8 @@ def _try(path: Path, any_kind: bool) -> None:
     if _is_special(target):
         if not any_kind:
             raise OSError(None, "is a device or a pipe")
-        # Without O_NONBLOCK, opening a pipe waits for a reader.
-        os.close(os.open(target, os.O_WRONLY | os.O_NONBLOCK | os.O_CLOEXEC))
+        # Without AT_ONCE, opening a pipe waits for a reader.
+        os.close(os.open(target, os.O_WRONLY | AT_ONCE | OPEN_FLAGS))
         return
     if target.exists() and not os.access(target, os.W_OK):
         raise PermissionError(None, "is write-protected")
@@ -158,7 +160,7 @@ def _partial(path: Path) -> Path:
 
 def _sync(path: Path) -> None:
     """Wait for the disk: some file systems find only then that it is full."""
-    file = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    file = os.open(path, os.O_RDWR | OPEN_FLAGS)
     try:
         os.fsync(file)
     finally:

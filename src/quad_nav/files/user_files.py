@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import contextlib
 import os
-import resource
 import stat
 from pathlib import Path
 from typing import Any, BinaryIO, Callable, Iterator, List, Optional, Sequence, TypeVar
 
 from quad_nav.errors import InputError
+from quad_nav.files.system import AT_ONCE, OPEN_FLAGS
 
 ALLOWED_FOLDERS = "QUAD_FILES_PATH"
 """Environment variable: folders that scene files may name files in, besides their own."""
@@ -30,8 +30,8 @@ def open_file(path: Path, max_bytes: Optional[int] = None) -> BinaryIO:
         InputError: The file cannot be read, is no regular file, or is too large.
     """
     try:
-        # Without O_NONBLOCK, opening a pipe waits for a writer.
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        # Without AT_ONCE, opening a pipe waits for a writer.
+        descriptor = os.open(path, os.O_RDONLY | AT_ONCE | OPEN_FLAGS)
     except (OSError, ValueError) as error:  # ValueError: a name with a NUL in it
         why = getattr(error, "strerror", None) or error
         raise InputError([f"{path}: cannot be read: {why}; expected a file"]) from error
@@ -134,6 +134,8 @@ def limit_memory(size_bytes: int) -> Iterator[None]:
     if not _STATM.exists():
         yield
         return
+    import resource  # not on Windows
+
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
     used = int(_STATM.read_text(encoding="ascii").split()[0]) * resource.getpagesize()
     limits = [used + size_bytes, *(one for one in (soft, hard) if one != resource.RLIM_INFINITY)]

@@ -6,7 +6,6 @@ so that no goal is flown twice after a crash. An unfinished last line is ignored
 
 from __future__ import annotations
 
-import fcntl
 import json
 import math
 import os
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.errors import InputError
+from quad_nav.files.system import OPEN_FLAGS, lock
 from quad_nav.files.user_files import read_bytes
 
 MAX_BYTES = 512 * 1024 * 1024
@@ -108,9 +108,9 @@ class Journal:
     def _open(self) -> int:
         """Open and lock the file: two missions must not share a journal."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        file = os.open(self.path, os.O_RDWR | os.O_CREAT | OPEN_FLAGS, 0o644)
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(file)
         except BlockingIOError as error:
             os.close(file)
             raise OSError(error.errno, "another running mission writes it") from error

@@ -36,7 +36,7 @@ def test_a_command_of_an_add_on_says_how_to_get_it(quad, command, package, extra
     assert refused.returncode == 1
     assert refused.stderr == (
         f"Error: quad {command}: {package} is not installed; "
-        f"expected it from pip install 'quad-nav{extra}'\n"
+        f"expected it from pip install 'quad-nav{extra}', or in a checkout from make venv\n"
     )
 
 
@@ -51,3 +51,13 @@ def test_commands_of_the_core_need_no_add_on(quad):
     assert "tune" in listed and "barn" in listed
     checked = quad("check", "tutorial")
     assert checked.returncode == 0, checked.stderr
+
+
+@pytest.mark.parametrize("command", ["fly --report a.html", "report a.bag", "preview"])
+def test_reports_say_how_to_get_what_they_draw_with(quad, command, tmp_path):
+    (tmp_path / "matplotlib.py").write_text("raise ModuleNotFoundError(name='matplotlib')")
+    (tmp_path / "a.bag").touch()
+    refused = quad(*command.split())
+    assert refused.returncode == 1
+    assert "matplotlib is not installed; expected it from pip install " in refused.stderr
+    assert refused.stdout == ""

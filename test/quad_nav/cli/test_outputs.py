@@ -64,7 +64,7 @@ def test_files_that_cannot_be_written(tmp_path, monkeypatch):
     assert refusal(tmp_path) == "is a folder"
     assert refusal(tmp_path / "file" / "x.json") == f"{tmp_path / 'file'} is not a folder"
     assert refusal(tmp_path / ("n" * 300)) == "File name too long"
-    assert refusal(tmp_path / "nul\0") == "embedded null byte"
+    assert "embedded null " in refusal(tmp_path / "nul\0")
     assert refusal(Path("/dev/null"), any_kind=False) == "is a device or a pipe"
     monkeypatch.setattr(os, "access", lambda *_: False)  # root may write everything
     assert refusal(tmp_path / "file") == "is write-protected"

@@ -112,7 +112,7 @@ def test_goals_at_one_place_are_a_loop_if_they_differ_in_yaw():
     "content, problem",
     [
         ('{"goals":\n [[1,2]\n', ":3:1: is not JSON: Expecting ',' delimiter"),
-        ('"goals": [[1,2],]', ":1:17: is not JSON: Expecting value"),
+        ('"goals": [[1,2],x]', ":1:17: is not JSON: Expecting value"),
         (b"\xff", ": byte 0 is not UTF-8"),
         ("[" * 100000, ": is nested too deeply"),
         ("[[1, 2]]", ": is a list; expected {"),
