@@ -10,8 +10,8 @@ The arguments are the ROS name, default, unit, range and a sentence. YAML, dynam
 
 A ``fixed_...`` parameter is read once, at the start. The others can change in flight; they stand in
 the order of upstream's ``.cfg`` file. ``own=True`` marks a parameter that upstream does not have,
-in a namespace of upstream. ``upstream=...`` marks one, too: it is the value that ``fixes/upstream``
-sets.
+in a namespace of upstream. One that can make the robot behave otherwise than upstream has
+``upstream=...`` instead: the value at which it behaves alike, which ``fixes/upstream`` sets.
 """
 
 from __future__ import annotations

@@ -105,7 +105,7 @@ def test_changelog_has_the_version():
 def test_paths_on_the_architecture_page_exist():
     page = (ROOT / "docs" / "architecture.md").read_text()
     table = page[page.index("| to change | open |") : page.index("## Rules of the core")]
-    paths = re.findall(r"`([\w./]+(?:/|\.py|\.md|Makefile|run))`", table)
+    paths = re.findall(r"`([\w./]+(?:/|\.py|\.js|\.md|Makefile|run))`", table)
     assert len(paths) > 30
     assert [
         path for path in paths if not any((at / path).exists() for at in (PACKAGE, SOURCES, ROOT))

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import quad_web
 from quad_nav.geometry import (
     Pose2D,
     Pose3D,
@@ -21,7 +24,7 @@ from quad_nav.mission.goal import Goal
 from quad_nav.peers.right_of_way import Yield, YieldDecision
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.motion import Motion, Walkers
-from quad_nav.sim.obstacles import Box, Cylinder, Sphere
+from quad_nav.sim.obstacles import SHAPES, Box, Cylinder, Sphere
 from quad_nav.sim.scene import MovingObstacle, Scene, Walls
 from quad_web.view.cells import buffered_cell, cell_items
 from quad_web.view.items import (
@@ -325,3 +328,9 @@ def test_unknown_numbers_are_none():
     assert row.get("goal_distance") is row["gap_m"] is row["goal"] is None
     assert (row["speed_mps"], row["recoveries"]) == (0.5, [1, 4])
     assert flight_item("ros", "room", "running", 1.0, rate=math.inf).data["rate"] is None
+
+
+def test_the_page_knows_every_shape():
+    script = (Path(quad_web.__file__).parent / "static" / "orbit_scene.js").read_text()
+    (table,) = re.findall(r"^const GEOMETRIES = \{\n(.*?)^\};", script, re.M | re.S)
+    assert set(re.findall(r"^  (\w+):", table, re.M)) == set(SHAPES)

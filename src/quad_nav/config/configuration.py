@@ -17,7 +17,6 @@ from quad_nav.config.files import COSTMAPS, below
 from quad_nav.config.filters import (
     COMMAND_FILTERS,
     SCAN_FILTERS,
-    FilterType,
     filter_names,
     filters_of,
     normalise_filters,
@@ -35,7 +34,7 @@ from quad_nav.config.planners import (
     planner_params,
     planner_table,
 )
-from quad_nav.config.plugins import plugin_name
+from quad_nav.config.plugins import Plugin, plugin_name
 from quad_nav.config.reader import Table, made, normalise
 from quad_nav.config.recoveries import (
     TABLES,
@@ -68,7 +67,7 @@ class Configuration:
         global_planner: Parameters of the planner that ``navigator`` names: its dataclass, or a
             ``Plugin`` of the user's. The same holds for ``local_planner``.
         recoveries: (name, parameters) in the order in which they are tried.
-        scan_filters: (name, type) in their order.
+        scan_filters: (name, class and parameters) in their order.
         command_filters: The same.
         local_planner_period_s: Control period that rollouts assume; as in move_base it may differ
             from the period of the control loop.
@@ -88,8 +87,8 @@ class Configuration:
     global_planner: Any
     local_planner: Any
     recoveries: Tuple[Tuple[str, RecoveryParams], ...]
-    scan_filters: Tuple[Tuple[str, FilterType], ...]
-    command_filters: Tuple[Tuple[str, FilterType], ...]
+    scan_filters: Tuple[Tuple[str, Plugin], ...]
+    command_filters: Tuple[Tuple[str, Plugin], ...]
     local_planner_period_s: float
     clearing_radius_m: float = fixed_number(
         "clearing_radius", None, "metres", "Half the side of the square that make_plan clears."

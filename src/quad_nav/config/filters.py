@@ -1,13 +1,13 @@
 """The lists ``scan_filters`` and ``command_filters``: types and parameters of each filter.
 
-A type is one of the core, ``quad/ScanValidator`` or ``quad/VoronoiCell``; ``package/Class`` of a
-Python package that is installed, such as an add-on; or the dotted name of a class. A filter's
-parameters are in the namespace of its name.
+A type is one of the core, such as ``quad/VoronoiCell``; ``package/Class`` of a Python package that
+is installed, such as an add-on; or the dotted name of a class. A filter's parameters are in the
+namespace of its name.
 """
 
 from __future__ import annotations
 
-from typing import Any, Dict, List, Mapping, Tuple, Union
+from typing import Any, Dict, List, Mapping, Tuple
 
 from quad_nav.config.notes import Notes, join
 from quad_nav.config.plugins import (
@@ -21,51 +21,46 @@ from quad_nav.config.reader import Namespace, check_class, named_types, subtree
 from quad_nav.parameter import checked
 
 SCAN_FILTERS, COMMAND_FILTERS = "scan_filters", "command_filters"
-SCAN_VALIDATOR, VORONOI_CELL = "quad/ScanValidator", "quad/VoronoiCell"
-_LISTS: Dict[str, Tuple[Interface, str, Tuple[Tuple[str, str], ...]]] = {
-    SCAN_FILTERS: (SCAN_FILTER, SCAN_VALIDATOR, (("validator", SCAN_VALIDATOR),)),
-    COMMAND_FILTERS: (COMMAND_FILTER, VORONOI_CELL, (("peers", VORONOI_CELL),)),
+_CORE = {
+    "quad/ScanValidator": "quad_nav.costmap.scan_validator.ScanValidator",
+    "quad/VoronoiCell": "quad_nav.navigator.command_filter.VoronoiCell",
 }
-
-FilterType = Union[str, Plugin]
-"""Type of a filter of the core, or the class and parameters of another one."""
+"""Class of each filter of the core by its type."""
+_LISTS: Dict[str, Tuple[Interface, Dict[str, str]]] = {
+    SCAN_FILTERS: (SCAN_FILTER, {"name": "validator", "type": "quad/ScanValidator"}),
+    COMMAND_FILTERS: (COMMAND_FILTER, {"name": "peers", "type": "quad/VoronoiCell"}),
+}
+"""Interface of the filters of each list, and the one filter of a robot without the list."""
 
 
 def normalise_filters(tree: Namespace, notes: Notes) -> None:
     """Check both lists, and that the classes exist; report every fault."""
-    for key, (interface, own, _) in _LISTS.items():
+    for key, (interface, _) in _LISTS.items():
         if tree.get(key) is None:  # a YAML key with nothing below it
             tree.pop(key, None)
             continue
         listed = named_types(tree[key], key, "a filter", notes)
         for name, kind in listed.items():
             subtree(tree, name, "", notes)
-            if kind != own:
-                loaded = check_class(class_name(kind), interface, join(key, name), notes)
-                owner = getattr(loaded, "params_class", None)  # declares the parameters
-                for parameter, fault in () if owner is None else checked(owner, tree[name])[1]:
-                    notes.problem(join(name, parameter), fault)
+            loaded = check_class(class_name(kind), interface, join(key, name), notes)
+            owner = getattr(loaded, "params_class", None)  # declares the parameters
+            for parameter, fault in () if owner is None else checked(owner, tree[name])[1]:
+                notes.problem(join(name, parameter), fault)
         tree[key] = [{"name": name, "type": kind} for name, kind in listed.items()]
 
 
-def filters_of(tree: Mapping[str, Any], key: str) -> Tuple[Tuple[str, FilterType], ...]:
-    """Return (name, type) of each filter of a list in a normalised tree."""
-    interface, own, usual = _LISTS[key]
-    if key not in tree:
-        return usual
-    found: List[Tuple[str, FilterType]] = []
-    for entry in tree[key]:
-        name, kind = entry["name"], entry["type"]
-        if kind == own:
-            found.append((name, kind))
-            continue
-        found.append((name, plugin_of(class_name(kind), interface, tree.get(name, {}), name)))
-    return tuple(found)
+def filters_of(tree: Mapping[str, Any], key: str) -> Tuple[Tuple[str, Plugin], ...]:
+    """Return (name, class and parameters) of each filter of a list in a normalised tree."""
+    interface, usual = _LISTS[key]
+    return tuple(
+        (name, plugin_of(class_name(kind), interface, tree.get(name, {}), name))
+        for name, kind in ((one["name"], one["type"]) for one in tree.get(key, [usual]))
+    )
 
 
 def class_name(kind: str) -> str:
     """Return the dotted name of a type: ``quad_moving.Tracker`` for ``quad_moving/Tracker``."""
-    return kind.replace("/", ".")
+    return _CORE.get(kind, kind.replace("/", "."))
 
 
 def filter_names(tree: Mapping[str, Any]) -> List[str]:

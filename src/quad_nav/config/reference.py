@@ -69,7 +69,7 @@ warnings without flying.
   `local_costmap/circumscribed_radius`. Values in their namespaces have no effect.
 * Without `scan_filters` the list is `quad/ScanValidator`, without `command_filters` it is
   `quad/VoronoiCell`. Parameters of other filters are below the filter's name: see
-  [plugins](plugins.md#command-filter) and [moving obstacles](moving_obstacles.md).
+  [plugins](plugins.md#command-filters) and [moving obstacles](moving_obstacles.md).
 * Layers of other packages are skipped. Planners of other packages, and a list with recoveries of
   other packages, are replaced by the defaults. Planners, layers and recoveries of your own are
   named as Python classes: see [plugins](plugins.md).

@@ -64,6 +64,20 @@ class SampleRules(NamedTuple):
     stuck_right: bool  # forbids turns in place of positive vtheta
 
 
+def sample_rules(params: TrajectoryPlannerParams, oscillation: Oscillation) -> SampleRules:
+    """Return the rules that parameters and the trajectories before ask for."""
+    return SampleRules(
+        vx_samples=int(params.vx_samples),
+        vtheta_samples=int(params.vtheta_samples),
+        holonomic=bool(params.holonomic_robot),
+        goes_forward=not oscillation.escaping,
+        slowest_turn_radps=float(params.min_in_place_vel_theta_radps),
+        lookahead_m=float(params.heading_lookahead_m),
+        stuck_left=oscillation.stuck_left,
+        stuck_right=oscillation.stuck_right,
+    )
+
+
 class _Search:
     """One search, from the robot's state on one costmap."""
 
@@ -74,7 +88,9 @@ class _Search:
 
     def follow_best(self, window: VelocityWindow) -> Optional[Trajectory]:
         """Return the trajectory of the first two stages, None if none is legal."""
-        sample, cost, facing = search(self.rollout.inputs, window, self._rules())
+        sample, cost, facing = search(
+            self.rollout.inputs, window, sample_rules(self.params, self.oscillation)
+        )
         if cost != NO_SAMPLE:
             self.oscillation.record_turn(sample, self.rollout.pose)
             return self._follow(sample)
@@ -104,19 +120,6 @@ class _Search:
         if trajectory.cost == COLLIDES and not is_refused:
             return Trajectory(trajectory.sample, _ESCAPE_COST, trajectory.points)
         return trajectory
-
-    def _rules(self) -> SampleRules:
-        params, oscillation = self.params, self.oscillation
-        return SampleRules(
-            vx_samples=int(params.vx_samples),
-            vtheta_samples=int(params.vtheta_samples),
-            holonomic=bool(params.holonomic_robot),
-            goes_forward=not oscillation.escaping,
-            slowest_turn_radps=float(params.min_in_place_vel_theta_radps),
-            lookahead_m=float(params.heading_lookahead_m),
-            stuck_left=oscillation.stuck_left,
-            stuck_right=oscillation.stuck_right,
-        )
 
     def _strafe(self, facing: float) -> Optional[Triple]:
         """Return the best sideways sample that ends facing the goal more than ``facing``."""

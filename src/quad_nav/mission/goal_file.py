@@ -137,6 +137,9 @@ def load_goals(
         check_place: Check for the positions of goals.
         defaults: Settings that the file does not give.
 
+    Returns:
+        The goals as in the file, see ``parse_goals``.
+
     Raises:
         InputError: The file cannot be read, or has faults; lists all of them.
     """
@@ -156,6 +159,9 @@ def parse_goals(
         name: Name of the file, for messages.
         check_place: Check for the positions of goals.
         defaults: Settings that the content does not give.
+
+    Returns:
+        The goals as in the file, nothing added or moved: the page writes them back.
 
     Raises:
         InputError: The content has faults; lists all of them.

@@ -161,6 +161,9 @@ class CommandFilters:
 class VoronoiCell(CommandFilter):
     """Keeps the robot in its Voronoi cell, so that no command leads into a peer."""
 
+    def __init__(self, params: Any = None) -> None:
+        """Take no parameters: those of the peers are the coordinator's."""
+
     def filter(self, command: Command, situation: Situation) -> Command:
         """Return the command, slower if it would leave the cell."""
         cell = situation.peers.cell(situation.map_pose, situation.velocity, situation.period_s)

@@ -42,8 +42,8 @@ class Intention:
 
     Attributes:
         priority: See ``priority_of``; the higher one goes first.
-        path: float64[n, 2], metres in ``map``: the remaining plan, empty for a robot that
-            stays where it is.
+        path: float64[n, 2], metres in ``map``: the whole plan, with what is flown of it; empty
+            for a robot that stays where it is.
     """
 
     priority: float = IDLE_PRIORITY

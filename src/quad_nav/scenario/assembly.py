@@ -21,7 +21,6 @@ from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.peer_layer import PeerLayerParams
 from quad_nav.costmap.scan_filter import ScanFilters
 from quad_nav.costmap.scan_validator import ScanValidator
-from quad_nav.navigator.command_filter import VoronoiCell
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
 from quad_nav.peers.coordinator import PeerCoordinator
@@ -78,18 +77,17 @@ def build_navigator(configuration: Configuration, number: Optional[int] = None) 
             local_costmap,
             configuration.robot if number is None else number,
         ),
-        [
-            kind.make() if isinstance(kind, Plugin) else VoronoiCell()
-            for _, kind in configuration.command_filters
-        ],
+        [plugin.make() for _, plugin in configuration.command_filters],
     )
 
 
 def build_scan_filters(configuration: Configuration) -> ScanFilters:
     """Build the scan filters of one robot, for all of its sensors."""
-    validator = ScanValidator(configuration.scan_validator)
-    kinds = (kind for _, kind in configuration.scan_filters)
-    return ScanFilters([kind.make() if isinstance(kind, Plugin) else validator for kind in kinds])
+    validator = ScanValidator(configuration.scan_validator)  # its parameters are the node's own
+    plugins = (plugin for _, plugin in configuration.scan_filters)
+    return ScanFilters(
+        [validator if one.plugin_class is ScanValidator else one.make() for one in plugins]
+    )
 
 
 def apply_configuration(navigator: Navigator, configuration: Configuration) -> None:

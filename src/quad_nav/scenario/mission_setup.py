@@ -63,7 +63,7 @@ class MissionSetup:
     ``scene`` and ``surface_distance`` are None if the scene is unknown. ``surface_distance`` reads
     ``people``, where people are who react to quadcopters; None if there are none. ``start_service``
     is called before the first goal is sent, ``end_service`` before the node exits, if they have
-    names. ``parameters`` are the navigators' trees, {} for one whose parameters are unknown.
+    names. ``configurations`` are the navigators', None for one whose parameters are unknown.
     ``facts`` are for the summary.
     """
 
@@ -77,12 +77,17 @@ class MissionSetup:
     warnings: Tuple[str, ...]
     journal: Path
     resume: bool
-    parameters: Tuple[Mapping[str, Any], ...] = ()
+    configurations: Tuple[Optional[Configuration], ...] = ()
     facts: Mapping[str, Any] = field(default_factory=dict)
     notes: Tuple[str, ...] = ()
     start_service: str = ""
     end_service: str = ""
     people: Optional[CrowdRecord] = None
+
+    @property
+    def parameters(self) -> Tuple[Mapping[str, Any], ...]:
+        """The navigators' parameter trees, {} for one that is unknown."""
+        return tuple(one.to_tree() if one else {} for one in self.configurations)
 
 
 def read_setup(
@@ -160,7 +165,7 @@ def _mission_setup(
         warnings,
         _journal_path(values, journals),
         values["resume"],
-        tuple(one.to_tree() if one else {} for one in scenario.configurations),
+        scenario.configurations,
         notes=scenario.notes,
         start_service=values["start_service"] or (START_SERVICE if values["simulation"] else ""),
         end_service=values["end_service"],

@@ -1,7 +1,8 @@
 """Shapes of obstacles. What a shape is, it says itself; drawings take its outline and height.
 
-The physics engine (``body``), the LIDAR's kernel (``rays``) and RViz (``topics.markers``) have a
-table each by ``Obstacle.shape``, and fail with a ``KeyError`` at a shape that they do not know.
+The physics engine (``body``), the LIDAR's kernel (``rays``), RViz (``topics.markers``) and the page
+(``orbit_scene.js``) have a table each by ``Obstacle.shape``, and fail at a shape that they do not
+know.
 """
 
 from __future__ import annotations

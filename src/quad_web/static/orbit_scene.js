@@ -58,7 +58,7 @@ export function disposeParts(object) {
 
 /** Add a solid and its edges to a group. */
 export function addSolid(group, solid, { color, opacity, edge = INK.solidEdge }) {
-  const geometry = shapeOf(solid)
+  const geometry = GEOMETRIES[solid.shape](solid)
     .rotateZ(solid.yaw)
     .translate(solid.x, solid.y, solid.bottom + solid.height / 2);
   const isGlass = opacity < 1;
@@ -75,11 +75,14 @@ export function addSolid(group, solid, { color, opacity, edge = INK.solidEdge })
   group.add(new THREE.Mesh(geometry, material), edges);
 }
 
-/** Return the geometry of a solid around its centre: but for a sphere, its outline drawn up. */
-function shapeOf({ shape, outline, height }) {
-  if (shape === "sphere") {
-    return new THREE.SphereGeometry(height / 2, 24, 16);
-  }
+/** Geometry of each shape around its centre. */
+const GEOMETRIES = {
+  box: extruded,
+  cylinder: extruded,
+  sphere: ({ height }) => new THREE.SphereGeometry(height / 2, 24, 16),
+};
+
+function extruded({ outline, height }) {
   const base = new THREE.Shape(outline.map(([x, y]) => new THREE.Vector2(x, y)));
   const options = { depth: height, bevelEnabled: false };
   return new THREE.ExtrudeGeometry(base, options).translate(0, 0, -height / 2);

@@ -8,7 +8,8 @@ from typing import Any, Dict, List
 
 from families.case import InvalidValue, Recorded
 from families.comparison import Comparison, Difference
-from quad_nav.config import Configuration, load, values
+from quad_nav.config import Configuration, load, reconfigurable, values
+from quad_nav.config.reader import RESTORE_DEFAULTS
 from quad_nav.costmap.inflation import InflationLayer
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayer
@@ -25,8 +26,8 @@ def check(path: Path) -> List[Difference]:
     configuration = load({})
     _check_costmap(configuration, recorded["costmap_defaults"], comparison)
     _check_planner(configuration, recorded["trajectory_planner_defaults"], comparison)
-    dwa = values(load({"base_local_planner": "dwa_local_planner/DWAPlannerROS"}), "DWAPlannerROS")
-    del dwa["restore_defaults"]  # a button, not recorded
+    dwa_configuration = load({"base_local_planner": "dwa_local_planner/DWAPlannerROS"})
+    dwa = _upstream_values(dwa_configuration, "DWAPlannerROS")
     _compare(comparison, "dwa_defaults", dwa, recorded["dwa_defaults"])
     return comparison.differences
 
@@ -122,13 +123,22 @@ def _check_planner(
     configuration: Configuration, recorded: Recorded, comparison: Comparison
 ) -> None:
     params, place = configuration.local_planner, "trajectory_planner_defaults"
-    planner = values(configuration, "TrajectoryPlannerROS")
-    del planner["restore_defaults"], planner["respect_meter_scoring"]  # not upstream's
+    planner = _upstream_values(configuration, "TrajectoryPlannerROS")
     planner["y_vels"] = params.y_vels_mps
     planner = {_UPSTREAM_NAMES.get(name, name): value for name, value in planner.items()}
     _compare(comparison, f"{place}.planner", planner, recorded["planner"])
     wrapper = {name: getattr(params, field) for name, field in _ROS.items()}
     _compare(comparison, f"{place}.ros", wrapper, recorded["ros"])
+
+
+def _upstream_values(configuration: Configuration, namespace: str) -> Dict[str, Any]:
+    """Values of the parameters that upstream has, but for a button, which is not recorded."""
+    found = values(configuration, namespace)
+    return {
+        parameter.name: found[parameter.name]
+        for parameter in reconfigurable(configuration)[namespace]
+        if not parameter.is_own and parameter != RESTORE_DEFAULTS
+    }
 
 
 def _compare(comparison: Comparison, place: str, found: Dict[str, Any], recorded: Recorded) -> None:

@@ -15,6 +15,7 @@ import pytest
 import quad_nav
 from quad_nav import api
 from quad_nav.recording.trace import TraceObserver
+from quad_nav.sim.obstacles import SHAPES
 
 ROOT = Path(__file__).resolve().parents[3]
 # Near the start poses (1.5, 1.5) and (10.0, 2.0) of the arena.
@@ -50,6 +51,7 @@ def test_every_name_is_there_and_typed():
     assert typed == set(api.__all__) == set(quad_nav._API)
     assert all(getattr(quad_nav, name) is getattr(api, name) for name in typed)
     assert typed < set(dir(quad_nav))
+    assert typed > {shape.__name__ for shape in SHAPES.values()}
 
 
 def test_unknown_names_are_refused():

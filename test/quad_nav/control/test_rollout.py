@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 from quad_nav.control.lanes import OFF_MAP, UNCERTAIN
+from quad_nav.control.oscillation import Oscillation
 from quad_nav.control.rollout import Rollout
 from quad_nav.control.rollout_kernel import cheapest
 from quad_nav.control.sample_motion import RolloutParams, last_cells, longest, travel
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.control.velocity_search import (
     NO_SAMPLE,
-    SampleRules,
     VelocityWindow,
+    sample_rules,
     search,
     spaced,
 )
@@ -86,16 +87,9 @@ def test_the_cheapest_is_that_of_all_scores(variant):
 @pytest.mark.parametrize("holonomic", [False, True])
 @pytest.mark.parametrize("forwards", [False, True])
 def test_the_search_finds_what_scoring_every_sample_finds(holonomic, forwards):
-    rules = SampleRules(
-        vx_samples=5,
-        vtheta_samples=9,
-        holonomic=holonomic,
-        goes_forward=forwards,
-        slowest_turn_radps=0.4,
-        lookahead_m=0.3,
-        stuck_left=False,
-        stuck_right=holonomic,
-    )
+    params = replace(PARAMS, holonomic_robot=holonomic, vx_samples=5, vtheta_samples=9)
+    params = replace(params, min_in_place_vel_theta_radps=0.4, heading_lookahead_m=0.3)
+    rules = sample_rules(params, Oscillation(escaping=not forwards, stuck_right=holonomic))
     turned = 0
     for seed in range(20):
         rollout = random_rollout(seed, PARAMS)

@@ -9,6 +9,7 @@ from test_navigator import FORWARD, GOAL, HERE, FakeRecovery, Flight
 from upstream import UPSTREAM
 
 from quad_nav import config
+from quad_nav.costmap.scan_validator import ScanValidator
 from quad_nav.errors import InputError
 from quad_nav.geometry import Twist2D
 from quad_nav.navigator.command_filter import Command, CommandFilter, StopReason, VoronoiCell
@@ -194,7 +195,7 @@ def test_the_voronoi_cell_names_the_peer_that_limits():
         ([{"name": "peers"}], "is not a filter; expected {name: , type: }"),
         ([{"name": "a", "type": "quad/VoronoiCell"}] * 2, "'a' is used twice"),
         ([{"name": "a", "type": "no_such_package/Class"}], "no module no_such_package"),
-        ([{"name": "a", "type": "quad/ScanValidator"}], "quad"),
+        ([{"name": "a", "type": "quad/ScanValidator"}], "is not derived from CommandFilter"),
         ([{"name": "a", "type": "quad_nav.geometry.Pose2D"}], "is not derived from CommandFilter"),
     ],
 )
@@ -206,6 +207,8 @@ def test_a_list_with_a_fault_is_refused(entries, problem):
 
 def test_the_default_lists_have_the_filters_of_the_core():
     configuration = config.load({})
-    assert configuration.scan_filters == (("validator", "quad/ScanValidator"),)
-    assert configuration.command_filters == (("peers", "quad/VoronoiCell"),)
+    ((scan_name, scan_filter),) = configuration.scan_filters
+    ((command_name, command_filter),) = configuration.command_filters
+    assert (scan_name, scan_filter.plugin_class) == ("validator", ScanValidator)
+    assert (command_name, command_filter.plugin_class) == ("peers", VoronoiCell)
     assert config.load({"command_filters": []}).command_filters == ()

@@ -168,6 +168,17 @@ def test_no_change_of_the_goals_is_lost():
     assert [_pop_change(thread) for _ in range(3)] == [False, True, False]
 
 
+def test_an_edited_file_is_compared_with_the_planner_again(ros, tmp_path):
+    mission = Mission(ros, tmp_path, [[1.0, 1.0]], config="default").begin()
+    (tmp_path / "quad0_goals.json").write_text('{"goals": [[1, 1]], "goal_tolerance": 0.001}')
+    robot = mission.runner.robots[0]
+    for _ in range(2):  # an editor may be writing it at the first time
+        robot._next_poll_s = 0.0
+        robot.poll_file()
+    (line,) = [line for line in ros.log.lines if "xy_goal_tolerance" in line]
+    assert "quad0_goals.json: a tolerance of 0.001 m is below the local planner's" in line
+
+
 def test_goals_are_published_while_a_file_with_fewer_goals_is_read(mission):
     mission.begin()
     robot = mission.runner.robots[0]

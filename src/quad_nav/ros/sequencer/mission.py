@@ -71,7 +71,8 @@ class MissionRunner:
         self._news = threading.Event()
         self._feed = StateFeed(len(setup.robots))
         self.robots = [
-            MissionRobot(index, goals, self._feed) for index, goals in enumerate(setup.robots)
+            MissionRobot(index, goals, self._feed, configuration)
+            for index, (goals, configuration) in enumerate(zip(setup.robots, setup.configurations))
         ]
         self._threads = [
             RobotThread(robot, self._record, self._news, len(self.robots)) for robot in self.robots

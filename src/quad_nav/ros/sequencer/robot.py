@@ -12,6 +12,7 @@ from move_base_msgs.msg import RecoveryStatus
 from numpy.typing import NDArray
 from quad.msg import MissionEvent
 
+from quad_nav.config import Configuration
 from quad_nav.errors import InputError, assert_never
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.mission.actions import Action, GoalEnded, SendGoal, SequenceDone
@@ -26,6 +27,7 @@ from quad_nav.ros.sequencer.flight_record import FlightRecord
 from quad_nav.ros.sequencer.odometry import OdometryIntake
 from quad_nav.ros.sequencer.robot_link import Inbox, PathPublisher
 from quad_nav.ros.sequencer.state_feed import StateFeed
+from quad_nav.scenario.goal_checks import file_warnings
 from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event
 
 FILE_POLL_S = 0.5  # wall time, because users edit files while the simulation is paused
@@ -51,13 +53,20 @@ class MissionRobot:
         is_stopped: Whether the mission is stopped on request; steps send no goals.
     """
 
-    def __init__(self, index: int, goals: RobotGoals, feed: StateFeed) -> None:
+    def __init__(
+        self,
+        index: int,
+        goals: RobotGoals,
+        feed: StateFeed,
+        configuration: Optional[Configuration],
+    ) -> None:
         """Connect the goals of robot `index` to its topics.
 
         Args:
             index: Number of the robot.
             goals: Its goals.
             feed: Poses of all robots.
+            configuration: That of its navigator, None if unknown.
         """
         self.name = goals.name
         self.sequencer = Sequencer(goals.sequence)
@@ -70,7 +79,7 @@ class MissionRobot:
         self.now_s = 0.0
         self._is_recorded = True  # whether the journal says whether the mission is stopped
         self._reports: List[NavigatorReport] = []  # for the next tick
-        self._file = goals.file
+        self._file, self._configuration = goals.file, configuration
         self._next_poll_s = 0.0
         self._index = index
         self._warnings = ThrottledWarnings()
@@ -211,6 +220,9 @@ class MissionRobot:
         with self.lock:
             self.sequencer.replace_sequence(sequence)
             self.is_done = False
+        goals = RobotGoals(self.name, self._file, sequence)
+        for warning in file_warnings([goals], [self._configuration]):
+            rospy.logwarn("%s", warning)
         count = len(sequence.goals)
         flown = min(self.sequencer.index, count)
         rospy.loginfo(f"{self.name}: goal file reloaded: {count} goals, {flown} of them flown")
