@@ -217,6 +217,12 @@ def normalize_angle(angle_rad: float) -> float:
     return math.atan2(math.sin(angle_rad), math.cos(angle_rad))
 
 
+def wrap_angle(angle_rad: float) -> float:
+    """Return the same angle in (-pi, pi], rounded as ``angles::normalize_angle`` of ROS."""
+    wrapped_rad = math.fmod(angle_rad + math.pi, 2.0 * math.pi)
+    return wrapped_rad + math.pi if wrapped_rad <= 0.0 else wrapped_rad - math.pi
+
+
 def angle_difference(to_rad: float, from_rad: float) -> float:
     """Return the shortest turn from ``from_rad`` to ``to_rad``, in [-pi, pi]."""
     return normalize_angle(to_rad - from_rad)

@@ -25,6 +25,7 @@ from interaction.navigator_world import (  # noqa: E402
     Walker,
 )
 
+from quad_nav.config.planners import SLOTS  # noqa: E402
 from quad_nav.geometry import Pose2D, Twist2D  # noqa: E402
 
 TIMEOUT_S = 0.5
@@ -36,6 +37,7 @@ GOALS = (Pose2D(6.5, 4.0), Pose2D(4.0, 6.5), Pose2D(1.5, 1.5))
 CLOCKS = st.sampled_from([(10**9, False), (10**9, True), (1_700_000_000 * 10**9 + 1, False)])
 """Begin in ns, and whether it is rounded: of a simulator, or of a real quadcopter."""
 WALKERS = st.sampled_from([(4.0, 7.0, 0.0, -1.0), (7.0, 4.0, -1.0, 0.0), (1.5, 7.0, 0.0, -0.6)])
+PLANNERS = st.sampled_from([(key, name) for key, slot in SLOTS.items() for name in slot.types])
 AT_GOAL_M = 0.3
 LOST_S = 0.9
 """A navigator has stopped for lost data by then."""
@@ -138,6 +140,11 @@ class NavigatorMachine(RuleBasedStateMachine):
     def the_control_frequency_changes(self, hz):
         self.hz = hz
         self.world.reconfigure({"controller_frequency": hz})
+        self.let_time_pass(0.3)
+
+    @rule(planner=PLANNERS)
+    def a_planner_changes(self, planner):
+        self.world.reconfigure(dict([planner]))
         self.let_time_pass(0.3)
 
     @rule()

@@ -14,7 +14,7 @@ import math
 from unittest import mock
 
 import rospy
-from interaction.virtual_threads import VirtualThreads
+from interaction.virtual_threads import Condition, VirtualThreads
 from rosgraph import masterapi
 from rospy.msg import args_kwds_to_message
 
@@ -97,7 +97,15 @@ class Graph:
             Timer=mock.MagicMock(),
         )
         yield rospy, of_rospy
-        yield rospy.rostime, {"wallsleep": self.threads.sleep, "get_rostime": self._clock}
+        condition = type("Condition", (Condition,), {"threads": self.threads})()
+        yield (
+            rospy.rostime,
+            {
+                "wallsleep": self.threads.sleep,
+                "get_rostime": self._clock,
+                "get_rostime_cond": lambda: condition,
+            },
+        )
         yield (
             masterapi.Master,
             {

@@ -92,7 +92,8 @@ class FakePublisher:
         return True
 
     def unregister(self) -> None:
-        del FakePublisher.all[self.resolved_name]
+        if FakePublisher.all[self.resolved_name] is self:
+            del FakePublisher.all[self.resolved_name]
 
 
 class FakeService:
@@ -104,6 +105,9 @@ class FakeService:
         self.resolved_name = rospy.resolve_name(name)
         self.service_class, self.handler = service_class, handler
         FakeService.all[self.resolved_name] = self
+
+    def shutdown(self) -> None:
+        del FakeService.all[self.resolved_name]
 
 
 class FakeWall:

@@ -87,6 +87,7 @@ class Goals(FlightCase):
         actions.is_preempt_requested.side_effect = arrive
         server = GoalServer.__new__(GoalServer)
         server._server, server._simple_goals, server._status = actions, deque(), mock.Mock()
+        server._untransformed = None
         with mock.patch.object(GoalServer, "_accept") as accept:
             server.poll(navigator, 1.0)
             server.poll(navigator, 1.05)

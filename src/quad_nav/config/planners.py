@@ -7,7 +7,7 @@ To add a planner, add a line to ``GLOBAL_PLANNERS`` or ``LOCAL_PLANNERS``, and o
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Dict, List, Mapping, Optional
+from typing import Any, Dict, Iterable, List, Mapping, Optional
 
 from quad_nav.config.fixes import with_fixes
 from quad_nav.config.notes import CAUTION, IGNORED, RENAMED, UNSUPPORTED, UNUSED, Notes, join
@@ -175,6 +175,18 @@ def normalise_planner_names(tree: Namespace, notes: Notes) -> None:
             tree[key] = _substitute(tree, slot)
             expected = f"--set {key}={tree[key]} or {_others(tree, key)}"
             notes.problem(key, f"{name} is not supported; expected {expected}")
+
+
+def change_planners(tree: Namespace, keys: Iterable[str], notes: Notes) -> None:
+    """Complete a normalised tree with other planners than before: those that ``keys`` name."""
+    for key in keys:
+        name, slot = tree[key], SLOTS[key]
+        if is_dotted(name):
+            check_class(name, slot.interface, key, notes)
+        elif name not in slot.types:
+            notes.problem(key, f"{name} is not supported; expected {' or '.join(slot.types)}")
+    if not notes.faults:
+        normalise_planners(tree, notes)
 
 
 def _substitute(tree: Namespace, slot: Slot) -> str:

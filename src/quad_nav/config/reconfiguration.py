@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import replace
-from typing import Any, Dict, List, Mapping, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.config.configuration import (
     Configuration,
@@ -13,8 +13,10 @@ from quad_nav.config.configuration import (
     workload_problems,
 )
 from quad_nav.config.files import below
-from quad_nav.config.notes import join
-from quad_nav.config.planners import SLOTS
+from quad_nav.config.notes import Notes, join
+from quad_nav.config.planners import SLOTS, change_planners, local_planner_period_s
+from quad_nav.config.plugins import plugin_name
+from quad_nav.config.recoveries import with_local_planner
 from quad_nav.errors import InputError
 from quad_nav.parameter import InvalidValue, Parameter
 
@@ -44,17 +46,23 @@ def values(configuration: Configuration, namespace: str) -> Dict[str, Any]:
 
 
 def updated(
-    configuration: Configuration, namespace: str, changes: Mapping[str, Any]
+    configuration: Configuration,
+    namespace: str,
+    changes: Mapping[str, Any],
+    stored: Optional[Mapping[str, Any]] = None,
 ) -> Configuration:
     """Return the configuration with some parameters of one namespace changed.
 
     Values are clamped to their ranges. ``restore_defaults`` restores the namespace as it was
-    loaded. As in move_base, recoveries keep the parameters that they were loaded with.
+    loaded. As in move_base, recoveries keep the parameters that they were loaded with. Another
+    planner has the parameters of its namespace.
 
     Args:
         configuration: The configuration in force.
         namespace: A namespace of ``reconfigurable``.
         changes: Name -> new value.
+        stored: Namespaces of other planners as they are now, such as on a parameter server; by
+            default they are as they were loaded.
 
     Raises:
         InputError: One line for every change that is refused; then no change is made.
@@ -63,12 +71,16 @@ def updated(
     if parameters is None:
         names = ", ".join(repr(name) for name in reconfigurable(configuration))
         raise InputError([f"{namespace}: not reconfigurable; expected one of {names}"])
-    checked = _checked(parameters, namespace, changes, configuration.tree)
+    checked = _checked(parameters, namespace, changes)
     if checked.get(_RESTORE):
         start = below(configuration.tree_at_start, namespace)
         checked = {parameter.name: start[parameter.name] for parameter in parameters}
     tree = copy.deepcopy(dict(configuration.tree))
     below(tree, namespace).update(checked)
+    planners = [key for key in SLOTS if tree[key] != configuration.tree[key]]
+    if planners:
+        tree.update(copy.deepcopy(dict(stored or {})))
+        configuration = _with_planners(configuration, tree, planners)
     changed = _remade(replace(configuration, tree=tree), namespace)
     problems = [f"{name}: {problem}" for name, problem in workload_problems(changed)]
     if problems:
@@ -76,11 +88,27 @@ def updated(
     return changed
 
 
+def _with_planners(
+    configuration: Configuration, tree: Dict[str, Any], keys: Sequence[str]
+) -> Configuration:
+    """Complete a tree in which ``keys`` name other planners; return what follows from them."""
+    notes = Notes("")
+    change_planners(tree, keys, notes)
+    notes.raise_problems()
+    names = [plugin_name(tree[key]) for key in keys]
+    start = {**configuration.tree_at_start, **{name: tree[name] for name in names if name in tree}}
+    configuration = replace(configuration, tree_at_start=start)
+    if "base_local_planner" not in keys:
+        return configuration
+    return replace(
+        configuration,
+        local_planner_period_s=local_planner_period_s(tree),
+        recoveries=with_local_planner(configuration.recoveries, tree),
+    )
+
+
 def _checked(
-    parameters: Tuple[Parameter, ...],
-    namespace: str,
-    changes: Mapping[str, Any],
-    tree: Mapping[str, Any],
+    parameters: Tuple[Parameter, ...], namespace: str, changes: Mapping[str, Any]
 ) -> Dict[str, Any]:
     known = {parameter.name: parameter for parameter in parameters}
     checked: Dict[str, Any] = {}
@@ -91,10 +119,6 @@ def _checked(
         place = join(namespace, name)
         if name not in known:
             problems.append(f"{place}: unknown parameter; expected one of {', '.join(known)}")
-        elif name in SLOTS and value != tree[name]:
-            problems.append(
-                f"{place}: planners cannot change in flight, got {value!r}; expected {tree[name]}"
-            )
         else:
             try:
                 checked[name] = _clamped(known[name], value)

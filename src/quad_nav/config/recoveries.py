@@ -84,6 +84,18 @@ def recoveries(
     return tuple((name, with_fixes(_params(name, kind, tree), tree)) for name, kind in sequence)
 
 
+def with_local_planner(
+    named: Tuple[Tuple[str, RecoveryParams], ...], tree: Mapping[str, Any]
+) -> Tuple[Tuple[str, RecoveryParams], ...]:
+    """Return (name, parameters) of recoveries that slow down the local planner of a tree."""
+    return tuple(
+        (name, with_fixes(_params(name, MOVE_SLOW, tree), tree))
+        if isinstance(params, MoveSlowAndClearParams)
+        else (name, params)
+        for name, params in named
+    )
+
+
 def circumscribed_radius_m(tree: Mapping[str, Any]) -> float:
     """Return move_base's circumscribed radius: its own parameter, not the footprint's."""
     costmap = tree["local_costmap"]
@@ -112,22 +124,30 @@ def _normalise_default_distances(tree: Namespace, notes: Notes) -> None:
 
 
 def _listed(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
-    """Return (name, type) of the supported ``recovery_behaviors``, None without that list."""
-    if "recovery_behaviors" not in tree:
+    """Return (name, type) of the ``recovery_behaviors``, None without that list.
+
+    As in move_base, a list with a mistake counts as none: the default behaviours run, never a part
+    of the list. It is removed from the tree.
+    """
+    place = "recovery_behaviors"
+    if place not in tree:
         return None
-    entries = tree["recovery_behaviors"]
-    listed = named_types(entries, "recovery_behaviors", "a behaviour", notes)
+    found = Notes("")
+    listed = named_types(tree[place], "", "a behaviour", found)
     listed = {name: full_type(kind) for name, kind in listed.items()}
-    for name in [name for name, kind in listed.items() if kind not in TABLES]:
-        if is_dotted(listed[name]):
-            check_class(listed[name], RECOVERY, join("recovery_behaviors", name), notes)
-            continue
-        text = (
-            f"{listed.pop(name)} is not supported, skipping this behaviour; expected one of"
-            f" {', '.join(TABLES)}"
-        )
-        notes.remark(join("recovery_behaviors", name), UNSUPPORTED, text)
-    return tuple(listed.items())
+    mistakes = [(place, CAUTION, fault.text) for fault in found.faults]
+    for name, kind in listed.items():
+        if is_dotted(kind):
+            check_class(kind, RECOVERY, join(place, name), notes)
+        elif kind not in TABLES:
+            text = f"{kind} is not supported; expected one of {', '.join(TABLES)}"
+            mistakes.append((join(place, name), UNSUPPORTED, text))
+    if not mistakes:
+        return tuple(listed.items())
+    for where, remark_kind, text in mistakes:
+        notes.remark(where, remark_kind, f"{text}; flying with the default recoveries instead")
+    del tree[place]
+    return None
 
 
 def listed_names(tree: Mapping[str, Any]) -> List[str]:

@@ -63,16 +63,16 @@ warnings without flying.
   reconfiguration of move_base on. Upstream has these two defaults.
 * `TrajectoryPlannerROS/controller_frequency` changes the rate that rollouts assume, not the rate of
   the control loop.
-* Without `recovery_behaviors` the sequence is `conservative_reset`, `rotate_recovery`,
-  `aggressive_reset`, `rotate_recovery`. The `reset_distance` of the first is
+* Without `recovery_behaviors`, or with a mistake in it, the sequence is `conservative_reset`,
+  `rotate_recovery`, `aggressive_reset`, `rotate_recovery`. The `reset_distance` of the first is
   `conservative_reset_dist`, that of the third is four times
   `local_costmap/circumscribed_radius`. Values in their namespaces have no effect.
 * Without `scan_filters` the list is `quad/ScanValidator`, without `command_filters` it is
   `quad/VoronoiCell`. Parameters of other filters are below the filter's name: see
   [plugins](plugins.md#command-filter) and [moving obstacles](moving_obstacles.md).
-* Layers and recoveries of other packages are skipped. Planners of other packages are replaced by
-  the defaults. Planners, layers and recoveries of your own are named as Python classes: see
-  [plugins](plugins.md).
+* Layers of other packages are skipped. Planners of other packages, and a list with recoveries of
+  other packages, are replaced by the defaults. Planners, layers and recoveries of your own are
+  named as Python classes: see [plugins](plugins.md).
 * Only the namespaces of the chosen planners are read. `rotate_recovery` reads its limits from
   `TrajectoryPlannerROS` whatever the local planner.
 """

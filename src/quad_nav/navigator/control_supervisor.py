@@ -70,6 +70,11 @@ class ControlSupervisor:
         self._last_valid_s = -math.inf
         self.reset()
 
+    def change_controller(self, controller: LocalPlanner) -> None:
+        """Supervise another local planner, without limits and without a plan."""
+        self.limiter, self._controller = ParameterLimiter(controller), controller
+        self.plan = None
+
     def reset(self) -> None:
         """Forget all progress, for another goal."""
         self._oscillation, self._progress = StallTimer(), StallTimer()

@@ -83,7 +83,7 @@ class Navigator(StateMachine):
         )
         self._idle_check = Schedule(_IDLE_CHECK_HZ)
         self._started = False
-        self._stop_wanted = False
+        self._stop_wanted: Optional[StopReason] = None
 
     @property
     def recoveries(self) -> Tuple[NamedRecovery, ...]:
@@ -102,8 +102,23 @@ class Navigator(StateMachine):
         self.params = params
 
     def set_planner(self, planner: GlobalPlanner) -> None:
-        """Replace the global planner; the plan in flight stays."""
+        """Replace the global planner by one of its kind; the plan in flight stays."""
         self.planner = planner
+
+    def change_planner(self, planner: GlobalPlanner) -> None:
+        """Change to another global planner: the robot stops and plans anew."""
+        self.planner = planner
+        self._stop_and_plan_anew()
+
+    def change_controller(self, controller: LocalPlanner) -> None:
+        """Change to another local planner: the robot stops and plans anew."""
+        self.controller = controller
+        self._control.change_controller(controller)
+        self._stop_and_plan_anew()
+
+    def _stop_and_plan_anew(self) -> None:
+        self._stop_wanted = StopReason.NO_PLAN
+        self.plan_anew()
 
     def set_controller_params(self, params: Any) -> None:
         """Change the local planner's parameters; limits of recoveries stay in force."""
@@ -116,17 +131,21 @@ class Navigator(StateMachine):
 
         As in move_base, an active goal is replaced or cancelled at the next control cycle only.
         """
+        if self.is_blocked_by_recovery:
+            return False
         return self.state is State.IDLE or self.is_cycle_due(now_s)
 
-    def set_goal(self, goal: Pose2D, now_s: float) -> None:
-        """Head for a pose in the global costmap's frame, from this cycle on."""
-        self.peers.start_goal(goal, now_s)
-        self._stop_wanted = False
+    def set_goal(self, goal: Optional[Pose2D], now_s: float) -> None:
+        """Head for a pose in the global costmap's frame, from this cycle on; None if unknown."""
+        if goal is not None:
+            self.peers.start_goal(goal, now_s)
+        self._stop_wanted = None
         self.start_goal(goal, now_s)
 
     def cancel(self) -> None:
         """Drop the goal; the next tick publishes a stop."""
-        self._stop_wanted = self.state is not State.IDLE
+        if self.state is not State.IDLE:
+            self._stop_wanted = StopReason.CANCELLED
         self.end_goal()
 
     # -- time ----------------------------------------------------------------------------
@@ -146,7 +165,7 @@ class Navigator(StateMachine):
     @property
     def has_work(self) -> bool:
         """True if a tick is due at once: the first one, or one that publishes a stop."""
-        return not self._started or self._stop_wanted
+        return not self._started or self._stop_wanted is not None
 
     def restart(self, now_s: float) -> None:
         """Restart schedules, patience and costmaps after the clock has jumped back."""
@@ -204,9 +223,9 @@ class Navigator(StateMachine):
 
     def _propose(self, tick: Tick, poses: RobotPoses, velocity: Twist2D) -> None:
         """Plan, control and recover, as far as it is due."""
-        if self._stop_wanted:
-            self._stop_wanted = False
-            tick.halt(StopReason.CANCELLED)
+        if self._stop_wanted is not None:
+            tick.halt(self._stop_wanted)
+            self._stop_wanted = None
         if self.state is State.IDLE and self._idle_check.pop(tick.now_s):
             self._make_room_when_idle(tick, poses.in_global)
         if self.state is not State.IDLE:
@@ -308,19 +327,21 @@ class Navigator(StateMachine):
 
     # -- planning ------------------------------------------------------------------------
 
-    def make_plan(
-        self, start: Pose2D, goal: Pose2D, tolerance_m: float = 0.0
-    ) -> NDArray[np.float64]:
-        """Plan between two poses without flying, as the service ``~make_plan`` does.
+    def make_plan(self, start: Pose2D, goal: Pose2D) -> NDArray[np.float64]:
+        """Plan between two poses without flying.
 
         Returns:
             The plan, float64[n, 3] of (x_m, y_m, yaw_rad) in the global costmap's frame.
 
         Raises:
-            PlanningError: There is no plan, not even within the tolerance of the goal.
+            PlanningError: There is no plan.
         """
-        costmap, add_goal = self.global_costmap, self.params.make_plan_add_unreachable_goal
+        return self.plan_near(start, goal, 0.0)[0]
+
+    def plan_near(
+        self, start: Pose2D, goal: Pose2D, tolerance_m: float
+    ) -> Tuple[NDArray[np.float64], bool]:
+        """Plan without flying, to a point beside the goal if need be; see ``plan.planner``."""
+        costmap = self.global_costmap
         with closed_edge(costmap, start, goal, self.params.plan_inside_map):
-            return plan_near(
-                self.planner, costmap.spec, costmap.costs, start, goal, tolerance_m, add_goal
-            )
+            return plan_near(self.planner, costmap.spec, costmap.costs, start, goal, tolerance_m)

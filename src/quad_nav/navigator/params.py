@@ -26,6 +26,12 @@ class NavigatorParams:
             restores upstream behaviour, which commands one control period later.
         stop_while_planning: A robot without a plan stops; False restores upstream behaviour,
             which leaves the last command in force.
+        interrupt_recoveries: A goal or cancel ends a recovery, and a robot that oscillates stops
+            before one; False restores upstream behaviour, which waits for the recovery's end, and
+            sends one more command before it.
+        check_goals: A goal whose pose is not valid is aborted and the robot stops; False restores
+            upstream behaviour, which tries it in every cycle or leaves the last command in force.
+            So for ``make_plan``: its requests are checked too, and a refusal has a reason.
         progress: Detection of a robot that makes no progress.
     """
 
@@ -90,3 +96,5 @@ class NavigatorParams:
     # Deviations from upstream
     command_in_first_cycle: bool = deviation()
     stop_while_planning: bool = deviation()
+    interrupt_recoveries: bool = deviation()
+    check_goals: bool = deviation()

@@ -127,10 +127,16 @@ class PlanSearch:
             self.thread.stop()
 
     def fail(self, now_s: float, params: NavigatorParams) -> bool:
-        """Count a failed search; return whether patience or retries are exhausted."""
+        """Count a failed search; return whether patience or retries are exhausted.
+
+        Upstream's thread needs no time for its retries, unless it has a planner frequency.
+        """
         self._failures += 1
         too_long = now_s > self._last_valid_s + params.planner_patience_s
-        too_often = 0 <= params.max_planning_retries < self._failures
+        failures = self._failures
+        if not params.command_in_first_cycle and not self._is_periodic:
+            failures = max(failures, params.max_planning_retries + 1)
+        too_often = 0 <= params.max_planning_retries < failures
         return too_long or too_often
 
     def pop_plan(self) -> Optional[NDArray[np.float64]]:

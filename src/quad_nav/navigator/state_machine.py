@@ -35,7 +35,7 @@ class StateMachine:
         params: The parameters; they may change in flight.
         planner: The global planner; it may be replaced in flight.
         state: The state.
-        goal: Goal pose in the global costmap's frame, None if the robot is idle.
+        goal: Goal pose in the global costmap's frame, None if the robot is idle or it is unknown.
     """
 
     def __init__(
@@ -65,8 +65,11 @@ class StateMachine:
 
     # -- goals ---------------------------------------------------------------------------
 
-    def start_goal(self, goal: Pose2D, now_s: float) -> None:
-        """Head for a pose in the global costmap's frame, from this cycle on."""
+    def start_goal(self, goal: Optional[Pose2D], now_s: float) -> None:
+        """Head for a pose in the global costmap's frame, from this cycle on.
+
+        None is a pose that is not known, for which there is no plan.
+        """
         if self.state is State.IDLE:
             self._cycle.start(now_s)
             self._starts_from_rest = True
@@ -95,6 +98,13 @@ class StateMachine:
         self._peers.end_goal()
         self._cycle.due_s = math.inf
 
+    def plan_anew(self) -> None:
+        """Drop the plan and the recoveries of the goal, if there is one; plan in the next cycle."""
+        self._search.drop()
+        self._recovery.reset()
+        if self.state is not State.IDLE:
+            self.state = State.PLANNING
+
     # -- time ----------------------------------------------------------------------------
 
     @property
@@ -117,18 +127,22 @@ class StateMachine:
         self._search.set_frequency(self.params.planner_frequency_hz, tick.now_s)
         if self._is_search_due(tick.now_s):
             self._search_plan(tick, poses.in_global)
-        if self._recovery.is_running:
-            if self.stops_without_data and self.missing_data(tick.now_s, poses):
-                self._recovery.pause(tick.now_s)
-            else:
-                self._step_recovery(tick, poses)
+        if self.is_blocked_by_recovery:
+            self._recovery_overruns |= self._cycle.pop(tick.now_s)
+            self._continue_recovery(tick, poses)
+        else:
+            if self._recovery.is_running:
+                self._continue_recovery(tick, poses)
+            self._run_due_cycle(tick, poses, velocity)
+        if not self.params.command_in_first_cycle and self._search.thread.is_due(tick.now_s):
+            self._search_plan(tick, poses.in_global)
+
+    def _run_due_cycle(self, tick: Tick, poses: RobotPoses, velocity: Twist2D) -> None:
         if self._cycle.pop(tick.now_s):
             tick.cycle = True
             self._recovery_overruns = self._recovery.is_running
             self._run_control_cycle(tick, poses, velocity)
             self._starts_from_rest = False
-        if not self.params.command_in_first_cycle and self._search.thread.is_due(tick.now_s):
-            self._search_plan(tick, poses.in_global)
 
     def hold_back(self, tick: Tick, pose: Optional[Pose2D]) -> None:
         """Take note that a command filter holds the robot back, at a pose."""
@@ -156,7 +170,7 @@ class StateMachine:
         costmap = self._global
         try:
             if start is None or target is None:
-                raise PlanningError("robot pose unknown")
+                raise PlanningError(f"{'goal' if target is None else 'robot'} pose unknown")
             with closed_edge(costmap, start, target, self.params.plan_inside_map):
                 tick.plan = self.planner.make_plan(costmap.spec, costmap.costs, start, target)
         except PlanningError as error:
@@ -180,12 +194,13 @@ class StateMachine:
             and self._control.track(tick.now_s, poses.in_global, self.params.oscillation_distance_m)
         ):
             self._recovery.reset_after(Trigger.OSCILLATION)
-        missing = self.missing_data(tick.now_s, poses)
+        # Upstream goes on without a pose: planning and control fail, and recoveries follow.
+        data = self.missing_data(tick.now_s, poses) if self.stops_without_data else ""
+        missing = data or self._updates.outdated_reason(tick.now_s)
         if missing:
             self.stop_without_data(tick, missing)
             return
-        assert poses.in_global is not None
-        if self._yield_to_peers(tick, poses.in_global):
+        if poses.in_global is not None and self._yield_to_peers(tick, poses.in_global):
             return
         plan = self._search.pop_plan()
         if plan is not None:
@@ -219,7 +234,6 @@ class StateMachine:
         return self.params.sensor_timeout_s > 0.0
 
     def _follow_plan(self, tick: Tick, poses: RobotPoses, velocity: Twist2D) -> None:
-        assert poses.in_local is not None and poses.in_global is not None
         params = self.params
         if self._control.is_goal_reached():
             if self._peers.holding_point is None:
@@ -229,6 +243,10 @@ class StateMachine:
             return
         if self._control.is_oscillating(tick.now_s, params.oscillation_timeout_s):
             self._enter_clearing(tick, Trigger.OSCILLATION)
+            if params.interrupt_recoveries:
+                return
+        if poses.in_global is None or poses.in_local is None:
+            self._miss_command(tick, None)
             return
         action = self._control.check_progress(
             tick, poses.in_global, params.progress, params.oscillation_distance_m
@@ -240,15 +258,20 @@ class StateMachine:
             self._begin_planning(tick.now_s)
         elif self._control.compute_velocity(tick, self._local, poses, velocity):
             self._recovery.reset_after(Trigger.CONTROLLING)
-        elif self._control.is_patience_exhausted(tick.now_s, params.controller_patience_s):
-            self._enter_clearing(tick, Trigger.CONTROLLING)
         else:
-            tick.halt(StopReason.NO_TRAJECTORY)
-            if params.escape_collision:
-                local = self._local
-                way_out = escape(local.spec, local.costs, local.footprint, poses.in_local)
-                tick.steer(way_out or Twist2D())
-            self._begin_planning(tick.now_s)
+            self._miss_command(tick, poses.in_local)
+
+    def _miss_command(self, tick: Tick, pose: Optional[Pose2D]) -> None:
+        """Plan anew, or recover after a while: the local planner has no command."""
+        if self._control.is_patience_exhausted(tick.now_s, self.params.controller_patience_s):
+            self._enter_clearing(tick, Trigger.CONTROLLING)
+            return
+        tick.halt(StopReason.NO_TRAJECTORY)
+        if self.params.escape_collision and pose is not None:
+            local = self._local
+            way_out = escape(local.spec, local.costs, local.footprint, pose)
+            tick.steer(way_out or Twist2D())
+        self._begin_planning(tick.now_s)
 
     # -- peers ---------------------------------------------------------------------------
 
@@ -286,6 +309,17 @@ class StateMachine:
             self._step_recovery(tick, poses)
         else:
             self._finish(tick, Outcome(False, self._recovery.trigger.value))
+
+    @property
+    def is_blocked_by_recovery(self) -> bool:
+        """True while a recovery delays goals and control cycles, as upstream."""
+        return self._recovery.is_running and not self.params.interrupt_recoveries
+
+    def _continue_recovery(self, tick: Tick, poses: RobotPoses) -> None:
+        if self.stops_without_data and self.missing_data(tick.now_s, poses):
+            self._recovery.pause(tick.now_s)
+        else:
+            self._step_recovery(tick, poses)
 
     def _step_recovery(self, tick: Tick, poses: RobotPoses) -> None:
         if self._recovery.step(tick, poses, self._control.limiter):

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from quad_nav.costmap import collision
 from quad_nav.costmap.cost_grid import costmap_view
 from quad_nav.errors import NoPath
-from quad_nav.geometry import Pose2D, angle_difference, normalize_angle
+from quad_nav.geometry import Pose2D, wrap_angle
 from quad_nav.grid import GridSpec
 
 _SHARE_STEP = 0.01
@@ -49,13 +49,13 @@ class Carrot:
         """
         if len(self.footprint) >= _CORNERS_NEEDED:
             costmap = costmap_view(spec, costs)
-            turn_rad = angle_difference(goal.yaw_rad, start.yaw_rad)
+            turn_rad = wrap_angle(goal.yaw_rad - start.yaw_rad)
             share = 1.0
             while share >= 0.0:
                 pose = (
                     start.x_m + share * (goal.x_m - start.x_m),
                     start.y_m + share * (goal.y_m - start.y_m),
-                    normalize_angle(start.yaw_rad + share * turn_rad),
+                    wrap_angle(start.yaw_rad + share * turn_rad),
                 )
                 if collision.footprint_cost(costmap, self.footprint, pose) >= 0.0:
                     return np.array([(start.x_m, start.y_m, start.yaw_rad), pose])

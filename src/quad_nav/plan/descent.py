@@ -1,13 +1,14 @@
 """Descent of a potential, half a cell a step, for NavFn and the global planner.
 
 Grids are flat arrays, cell = y * size_x + x. A position is a flat cell and an offset from its
-centre, float32, in cells to the right (dx) and up (dy).
+centre, float32, in cells to the right (dx) and up (dy). Each value has the width and is rounded in
+the order of upstream's, so that paths are equal to the bit.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple, Tuple
+from typing import NamedTuple, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,7 @@ from quad_nav.plan.wavefront_kernel import NOT_REACHED
 
 OBSTACLE = 254  # NavFn never enters cells of this cost
 NEUTRAL = 50  # NavFn's cost of a free cell
-_OBSTACLE_SLOPE = 254  # of cells inside an obstacle, beside a reached one
-_STEP_CELLS = 0.5
+_STEP_CELLS = np.float32(0.5)
 
 
 class Surroundings(NamedTuple):
@@ -41,23 +41,15 @@ class Surroundings(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _gradient(potential: NDArray[np.float32], size_x: int, cell: int) -> Tuple[Any, Any]:
-    """Return the vector down float32[n] at a cell, (0, 0) where there is none."""
-    if cell < size_x or cell > potential.size - size_x - 1:
-        return 0.0, 0.0
-    return _slope(potential, cell, 1), _slope(potential, cell, size_x)
+def _length(x: np.float32, y: np.float32) -> np.float32:
+    return np.float32(math.sqrt(np.float64(x) * x + np.float64(y) * y))
 
 
 @njit(cache=True, nogil=True)
 def _slope(potential: NDArray[np.float32], cell: int, stride: int) -> np.float32:
+    """Return the fall of float32[n] at a reached cell, towards higher indices."""
     before, here, after = potential[cell - stride], potential[cell], potential[cell + stride]
     slope = np.float32(0.0)
-    if here >= NOT_REACHED:  # inside an obstacle: towards the reached side
-        if before < NOT_REACHED:
-            return np.float32(-_OBSTACLE_SLOPE)
-        if after < NOT_REACHED:
-            return np.float32(_OBSTACLE_SLOPE)
-        return slope
     if before < NOT_REACHED:
         slope += before - here
     if after < NOT_REACHED:
@@ -69,25 +61,40 @@ def _slope(potential: NDArray[np.float32], cell: int, stride: int) -> np.float32
 def _unit_gradient(
     potential: NDArray[np.float32], size_x: int, cell: int
 ) -> Tuple[np.float32, np.float32]:
-    gx, gy = _gradient(potential, size_x, cell)
-    norm = math.hypot(gx, gy)
-    if norm > 0.0:
-        return np.float32(gx / norm), np.float32(gy / norm)
-    return np.float32(0.0), np.float32(0.0)
+    """Return the direction down float32[n] at a reached cell, (0, 0) where there is none."""
+    none = np.float32(0.0)
+    if cell < size_x or cell > potential.size - size_x - 1:
+        return none, none
+    gx, gy = _slope(potential, cell, 1), _slope(potential, cell, size_x)
+    length = _length(gx, gy)
+    if length > none:
+        inverse = np.float32(1.0) / length
+        return inverse * gx, inverse * gy
+    return none, none
 
 
 @njit(cache=True, nogil=True)
 def _lowest_around(potential: NDArray[np.float32], size_x: int, cell: int) -> Tuple[int, bool]:
-    """Return the lowest of a cell and its eight neighbours; True if all nine are reached."""
-    lowest, all_reached = cell, True
+    """Return the lowest of a cell and its eight neighbours; True if all nine are reached.
+
+    As upstream, one is lower than another if it is below the whole part of that.
+    """
+    lowest, all_reached = cell, potential[cell] < NOT_REACHED
+    bound = math.floor(potential[cell])
     for offset_y in (-size_x, 0, size_x):
         for offset_x in (-1, 0, 1):
             neighbour = cell + offset_y + offset_x
             if not 0 <= neighbour < potential.size or potential[neighbour] >= NOT_REACHED:
                 all_reached = False
-            elif potential[neighbour] < potential[lowest]:
-                lowest = neighbour
+            elif neighbour != cell and potential[neighbour] < bound:
+                lowest, bound = neighbour, math.floor(potential[neighbour])
     return lowest, all_reached
+
+
+@njit(cache=True, nogil=True)
+def _blend(share: np.float32, first: np.float32, second: np.float32) -> np.float32:
+    """Return the mean of two numbers, of which the second one has a share."""
+    return np.float32((1.0 - share) * first + share * second)
 
 
 @njit(cache=True, nogil=True)
@@ -143,13 +150,13 @@ def step_down(
     )
     if oscillates or not all_reached:
         return potential[lowest] < NOT_REACHED, lowest, np.float32(0.0), np.float32(0.0)
-    gx = np.float32((1.0 - dy) * ((1.0 - dx) * x00 + dx * x10) + dy * ((1.0 - dx) * x01 + dx * x11))
-    gy = np.float32((1.0 - dy) * ((1.0 - dx) * y00 + dx * y10) + dy * ((1.0 - dx) * y01 + dx * y11))
+    gx = _blend(dy, _blend(dx, x00, x10), _blend(dx, x01, x11))
+    gy = _blend(dy, _blend(dx, y00, y10), _blend(dx, y01, y11))
     if gx == 0.0 and gy == 0.0:
         return False, cell, dx, dy
-    scale = np.float32(_STEP_CELLS / math.hypot(gx, gy))
-    cell, dx = _carry(cell, np.float32(dx + gx * scale), 1)
-    cell, dy = _carry(cell, np.float32(dy + gy * scale), size_x)
+    scale = _STEP_CELLS / _length(gx, gy)
+    cell, dx = _carry(cell, dx + gx * scale, 1)
+    cell, dy = _carry(cell, dy + gy * scale, size_x)
     return True, cell, dx, dy
 
 
@@ -180,7 +187,8 @@ def descend(
             return k + 1, True
         if leaves_map(potential, size_x, cell):
             return k, False
-        path[k, 0], path[k, 1] = cell % size_x + dx, cell // size_x + dy
+        path[k, 0] = np.float32(np.float32(cell % size_x) + dx)
+        path[k, 1] = np.float32(np.float32(cell // size_x) + dy)
         if cell != known:
             around, known = surroundings(potential, size_x, cell), cell
         goes_on, cell, dx, dy = step_down(potential, size_x, around, cell, dx, dy, path, k)

@@ -31,7 +31,16 @@ from numpy.typing import NDArray
 from quad_nav.errors import GoalOutsideMap, StartOutsideMap
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
-from quad_nav.parameter import POSITIVE, choice, fixed_flag, fixed_whole, flag, signed, whole
+from quad_nav.parameter import (
+    POSITIVE,
+    choice,
+    deviation,
+    fixed_flag,
+    fixed_whole,
+    flag,
+    signed,
+    whole,
+)
 from quad_nav.plan import global_planner_kernel as kernel
 from quad_nav.plan import wavefront_kernel as wavefront
 from quad_nav.plan.navfn import cell_on_map, no_path
@@ -48,6 +57,7 @@ class SearchPlannerParams:
 
     Attributes:
         orientation_mode: One of ``OrientationMode``.
+        turns_from_bend: See ``plan.orientations.with_headings``.
     """
 
     lethal_cost: int = whole("lethal_cost", 253, "", 1, 255, "Cost of an obstacle.")
@@ -78,6 +88,7 @@ class SearchPlannerParams:
     publish_scale: int = fixed_whole(
         "publish_scale", 100, "Highest published potential.", low=1, high=127, domain=POSITIVE
     )
+    turns_from_bend: bool = deviation()
 
 
 class SearchPlanner:
@@ -120,7 +131,11 @@ class SearchPlanner:
         ) * spec.resolution_m + (spec.origin_x_m, spec.origin_y_m)
         plan[len(path) :] = goal.x_m, goal.y_m, goal.yaw_rad
         return with_headings(
-            plan, start.yaw_rad, self.params.orientation_mode, self.params.orientation_window_size
+            plan,
+            start.yaw_rad,
+            self.params.orientation_mode,
+            self.params.orientation_window_size,
+            self.params.turns_from_bend,
         )
 
     @property
@@ -234,9 +249,9 @@ class SearchPlanner:
 def wave_params(params: SearchPlannerParams) -> wavefront.WaveParams:
     """Return the parameters of Dijkstra's search, and its costs of cells."""
     lethal = params.lethal_cost
-    table = np.minimum(
-        np.arange(256) * np.float32(params.cost_factor) + params.neutral_cost, lethal - 1
-    )
+    costs = np.arange(256, dtype=np.float32)
+    table = costs * np.float32(params.cost_factor) + np.float32(params.neutral_cost)
+    table = np.minimum(table, np.float32(lethal - 1))
     passable = np.arange(256) < lethal - 1
     passable[UNKNOWN] |= params.allow_unknown
     table = np.where(passable, table, lethal).astype(np.float32)
@@ -271,10 +286,10 @@ def _outline(grid: NDArray[Any], value: int = LETHAL) -> None:
     grid[:, [0, -1]] = value
 
 
-def _hundredths(coordinate: float) -> np.float32:
+def _hundredths(coordinate: float) -> float:
     """Return a coordinate's fraction, rounded as upstream does."""
-    fraction = np.float32(coordinate - int(coordinate))
-    return np.float32(np.floor(np.float32(fraction * 100 + 0.5)) / 100)
+    fraction = coordinate - int(coordinate)
+    return float(np.floor(np.float32(fraction * 100 + 0.5)) / np.float32(100))
 
 
 def _flat(point: Point, size_x: int) -> int:

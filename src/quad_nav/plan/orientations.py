@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import enum
+import math
+from typing import List, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.geometry import wrap_angle
 from quad_nav.parameter import Choice
 
 # A turn of more than this between two points ends the last straight part of a path.
@@ -41,58 +44,74 @@ ORIENTATIONS = (
 
 # From the path's direction to the robot's heading.
 _TURNED_RAD = {
-    OrientationMode.FORWARD: 0.0,
-    OrientationMode.FORWARD_THEN_INTERPOLATE: 0.0,
-    OrientationMode.BACKWARD: np.pi,
-    OrientationMode.LEFTWARD: -np.pi / 2,
-    OrientationMode.RIGHTWARD: np.pi / 2,
+    OrientationMode.BACKWARD: math.pi,
+    OrientationMode.LEFTWARD: -math.pi / 2,
+    OrientationMode.RIGHTWARD: math.pi / 2,
 }
 
 
 def with_headings(
-    plan: NDArray[np.float64], start_yaw_rad: float, mode: int, window: int
+    plan: NDArray[np.float64], start_yaw_rad: float, mode: int, window: int, turns_from_bend: bool
 ) -> NDArray[np.float64]:
-    """Return a plan, float64[n, 3], with new yaws in all rows but the last.
+    """Return a plan, float64[n, 3], with new yaws; the last one is the goal's.
 
-    Modes that interpolate begin with the robot's heading. The direction at a point is that from the
-    point ``window`` points before to the one so many after it.
+    Args:
+        plan: float64[n, 3], n >= 1, rows x, y, yaw.
+        start_yaw_rad: Heading of the robot, with which modes that interpolate begin.
+        mode: One of ``OrientationMode``.
+        window: The direction at a point is that from the point ``window`` points before to the one
+            so many after it.
+        turns_from_bend: The last straight part of a path turns from its own heading to the goal's.
+            False restores upstream behaviour: its first point has turned as if the whole path
+            did, so its last one has turned too far.
     """
     plan = plan.copy()
-    mode = OrientationMode(mode)
+    mode, yaws = OrientationMode(mode), plan[:, 2]
+    if mode not in (OrientationMode.NONE, OrientationMode.INTERPOLATE):
+        yaws[:-1] = _directions(plan[:, :2].tolist(), window)[:-1]
     if mode in _TURNED_RAD:
-        turned = directions(plan[:, :2], window) + _TURNED_RAD[mode]
-        plan[:-1, 2] = np.arctan2(np.sin(turned), np.cos(turned))[:-1]
+        turned_rad = _TURNED_RAD[mode]
+        yaws[:-1] = [wrap_angle(_as_sent(yaw) + turned_rad) for yaw in yaws[:-1].tolist()]
     if mode is OrientationMode.INTERPOLATE:
-        plan[0, 2] = start_yaw_rad
-        _interpolate(plan[:, 2])
+        _interpolate(yaws, start_yaw_rad, 0, turns_from_bend)
     elif mode is OrientationMode.FORWARD_THEN_INTERPOLATE and len(plan) > 2:
-        straight = _start_of_last_straight(plan[:-1, 2])
-        plan[0, 2] = start_yaw_rad
-        _interpolate(plan[straight:, 2])
+        straight = _start_of_last_straight(yaws[:-1].tolist())
+        first_rad = _as_sent(yaws[straight]) if straight else start_yaw_rad
+        yaws[0] = start_yaw_rad
+        _interpolate(yaws, first_rad, straight, turns_from_bend)
     return plan
 
 
-def directions(points: NDArray[np.float64], window: int) -> NDArray[np.float64]:
-    """Return the path's direction at each of its points, float64[n, 2]: float64[n], radians."""
-    index = np.arange(len(points))
-    before = points[np.maximum(index - window, 0)]
-    after = points[np.minimum(index + window, len(points) - 1)]
-    dx, dy = (after - before).T
-    return np.arctan2(dy, dx)
+def _directions(points: List[Tuple[float, float]], window: int) -> List[float]:
+    """Return the path's direction at each of its points, in radians."""
+    # Not numpy's: the last bits of its arctan2 depend on the processor.
+    last = len(points) - 1
+    found = []
+    for k in range(len(points)):
+        (x0, y0), (x1, y1) = points[max(k - window, 0)], points[min(k + window, last)]
+        found.append(math.atan2(y1 - y0, x1 - x0))
+    return found
 
 
-def _interpolate(yaws: NDArray[np.float64]) -> None:
-    """Set equal turns from the first yaw to the last, the short way, in float64[n]."""
-    turn = np.arctan2(np.sin(yaws[-1] - yaws[0]), np.cos(yaws[-1] - yaws[0]))
-    blended = yaws[0] + np.linspace(0.0, turn, len(yaws))
-    yaws[1:-1] = np.arctan2(np.sin(blended), np.cos(blended))[1:-1]
+def _as_sent(yaw_rad: float) -> float:
+    """Return a yaw as upstream reads it back from the quaternion of a pose."""
+    z, w = math.sin(0.5 * yaw_rad), math.cos(0.5 * yaw_rad)
+    return math.atan2(2.0 * (w * z), w * w - z * z)
 
 
-def _start_of_last_straight(yaws: NDArray[np.float64]) -> int:
+def _interpolate(
+    yaws: NDArray[np.float64], first_rad: float, first: int, turns_from_bend: bool
+) -> None:
+    """Set equal turns from a point to the last one, the short way, in float64[n]."""
+    turn_rad = wrap_angle(yaws[-1] - first_rad) / max(1, len(yaws) - 1 - first)
+    steps = np.arange(len(yaws) - first) + (0 if turns_from_bend else first)
+    yaws[first:] = first_rad + turn_rad * steps
+
+
+def _start_of_last_straight(yaws: List[float]) -> int:
     """Return the first point from which on the path keeps its last direction."""
     k = len(yaws) - 2
-    turns = yaws - yaws[k]
-    bends = np.abs(np.arctan2(np.sin(turns), np.cos(turns))) > _STRAIGHT_RAD
-    while k > 0 and not bends[k - 1]:
+    last_rad = _as_sent(yaws[k])
+    while k > 0 and abs(wrap_angle(last_rad - _as_sent(yaws[k - 1]))) <= _STRAIGHT_RAD:
         k -= 1
     return k

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from typing import Iterator, Protocol, Tuple
 
 import numpy as np
@@ -45,43 +44,62 @@ def plan_near(
     start: Pose2D,
     goal: Pose2D,
     tolerance_m: float,
-    append_goal: bool,
-) -> NDArray[np.float64]:
+) -> Tuple[NDArray[np.float64], bool]:
     """Plan to the goal, or to the first point on square rings around it that has a plan.
 
-    A point may be ``tolerance_m`` away along x or y; with ``append_goal`` its plan ends at the goal
-    all the same. Other arguments are those of ``GlobalPlanner.make_plan``.
+    A point may be ``tolerance_m`` away along x or y. Other arguments are those of
+    ``GlobalPlanner.make_plan``.
+
+    Returns:
+        The plan, and True if it is to a point beside the goal.
 
     Raises:
         PlanningError: No point has a plan; the error is the goal's own.
     """
     try:
-        return planner.make_plan(spec, costs, start, goal)
+        return planner.make_plan(spec, costs, start, goal), False
     except PlanningError as error:
         unreachable = error
-    step_m = _ring_step_m(spec.resolution_m, tolerance_m)
-    for dx, dy in ring_offsets(step_m, tolerance_m):
+    reach_m = min(tolerance_m, _farthest_m(spec, goal))
+    for dx, dy in ring_offsets(spec.resolution_m, tolerance_m, reach_m):
         near = Pose2D(goal.x_m + dx, goal.y_m + dy, goal.yaw_rad)
         try:
-            plan = planner.make_plan(spec, costs, start, near)
+            return planner.make_plan(spec, costs, start, near), True
         except PlanningError:
             continue
-        return np.vstack([plan, [goal.x_m, goal.y_m, goal.yaw_rad]]) if append_goal else plan
     raise unreachable
 
 
-def _ring_step_m(resolution_m: float, tolerance_m: float) -> float:
-    step_m = 3.0 * resolution_m
-    return tolerance_m if 0.0 < tolerance_m < step_m else step_m
+def _farthest_m(spec: GridSpec, goal: Pose2D) -> float:
+    """Return how far from the goal, along x or y, the map ends: no farther point has a plan."""
+    from_left_m, from_below_m = goal.x_m - spec.origin_x_m, goal.y_m - spec.origin_y_m
+    width_m, height_m = spec.size_x * spec.resolution_m, spec.size_y * spec.resolution_m
+    return max(from_left_m, width_m - from_left_m, from_below_m, height_m - from_below_m)
 
 
-def ring_offsets(step_m: float, reach_m: float) -> Iterator[Tuple[float, float]]:
-    """Yield points (dx, dy) on growing square rings, in the order of upstream move_base."""
-    for ring in range(1, int(math.floor(reach_m / step_m + 1e-9)) + 1):
+def ring_offsets(
+    resolution_m: float, tolerance_m: float, reach_m: float
+) -> Iterator[Tuple[float, float]]:
+    """Yield points (dx, dy) on growing square rings, three cells apart, as upstream move_base.
+
+    Sums are float32: on the border of two cells the last bit decides.
+
+    Args:
+        resolution_m: Side of a cell.
+        tolerance_m: Distance of the rings, if it is shorter than three cells.
+        reach_m: Distance of the last ring at most.
+    """
+    step = np.float32(3.0 * float(np.float32(resolution_m)))
+    if 0.0 < tolerance_m < step:
+        step = np.float32(tolerance_m)
+    offsets = [np.float32(0.0)]
+    while float(offsets[-1] + step) <= reach_m:
+        offsets.append(offsets[-1] + step)
+        ring = len(offsets) - 1
         for y, x in itertools.product(range(ring + 1), repeat=2):
             if max(x, y) < ring:
                 continue
             for sign_y, sign_x in itertools.product((-1, 1), repeat=2):
                 if (y == 0 and sign_y < 0) or (x == 0 and sign_x < 0):
                     continue
-                yield sign_x * x * step_m, sign_y * y * step_m
+                yield sign_x * float(offsets[x]), sign_y * float(offsets[y])

@@ -98,8 +98,8 @@ def start_between_cells(
     potential: NDArray[np.float32],
     source: int,
     size_x: int,
-    dx: np.float32,
-    dy: np.float32,
+    dx: float,
+    dy: float,
     neutral: int,
 ) -> NDArray[np.int64]:
     """Begin at a point between the centres of four cells of float32[n].
@@ -110,11 +110,11 @@ def start_between_cells(
     Returns:
         The first front, int64[8] flat cells.
     """
-    twice, one = np.float32(2 * neutral), np.float32(1.0)
+    twice = 2 * neutral
     _seed(potential, source, twice * dx * dy)
-    _seed(potential, source + 1, twice * (one - dx) * dy)
-    _seed(potential, source + size_x, twice * dx * (one - dy))
-    _seed(potential, source + size_x + 1, twice * (one - dx) * (one - dy))
+    _seed(potential, source + 1, twice * (1.0 - dx) * dy)
+    _seed(potential, source + size_x, twice * dx * (1.0 - dy))
+    _seed(potential, source + size_x + 1, twice * (1.0 - dx) * (1.0 - dy))
     return np.array(
         [
             source + 2,
@@ -130,7 +130,7 @@ def start_between_cells(
 
 
 @njit(cache=True, nogil=True)
-def _seed(potential: NDArray[np.float32], cell: int, value: np.float32) -> None:
+def _seed(potential: NDArray[np.float32], cell: int, value: float) -> None:
     if 0 <= cell < potential.size:
         potential[cell] = value
 

@@ -43,8 +43,6 @@ class NavigatorTopics:
         self._navigator = navigator
         self._node = f"/move_base{robot}"
         self._command_topic = f"/cmd_vel{robot}"
-        self._planner = plugin_name(navigator.params.base_global_planner)
-        self._controller = plugin_name(navigator.params.base_local_planner)
         self._schedule = RobotTopicSchedule()
         self._costmaps: Dict[str, Tuple[LayeredCostmap, CostmapSchedule]] = {
             name: (costmap, CostmapSchedule(costmap))
@@ -102,19 +100,21 @@ class NavigatorTopics:
         plan = tick.plan if tick.plan is not None else _NO_PLAN if tick.planning_failed else None
         if plan is not None:
             frame = self._navigator.global_costmap.params.global_frame
-            self._write_path(f"{self._planner}/plan", plan, frame, stamp, stamp)
+            planner = plugin_name(self._navigator.params.base_global_planner)
+            self._write_path(f"{planner}/plan", plan, frame, stamp, stamp)
         if tick.control is not None:
             self._write_control(tick.control, stamp)
 
     def _write_control(self, control: Control, stamp: int) -> None:
         frame = self._navigator.local_costmap.params.global_frame
+        controller = plugin_name(self._navigator.params.base_local_planner)
         # As in C++ move_base, the plan that the controller follows has no stamp.
         for name, plan, own_stamp in (
             ("global_plan", control.global_plan, 0),
             ("local_plan", control.local_plan, stamp),
         ):
             if len(plan):
-                self._write_path(f"{self._controller}/{name}", plan, frame, stamp, own_stamp)
+                self._write_path(f"{controller}/{name}", plan, frame, stamp, own_stamp)
 
     def _write_path(
         self, name: str, plan: NDArray[np.float64], frame: str, stamp: int, own: int

@@ -70,12 +70,7 @@ def build_navigator(configuration: Configuration, number: Optional[int] = None) 
         global_costmap,
         local_costmap,
         build_global_planner(configuration.global_planner, global_costmap.footprint),
-        _made(
-            LOCAL_PLANNERS,
-            configuration.local_planner,
-            local_costmap.footprint,
-            configuration.local_planner_period_s,
-        ),
+        build_local_planner(configuration, local_costmap.footprint),
         [NamedRecovery(name, build_recovery(params)) for name, params in configuration.recoveries],
         PeerCoordinator(
             configuration.peers,
@@ -98,21 +93,46 @@ def build_scan_filters(configuration: Configuration) -> ScanFilters:
 
 
 def apply_configuration(navigator: Navigator, configuration: Configuration) -> None:
-    """Change every parameter of a navigator that may change in flight; plan and goal stay."""
+    """Change every parameter of a navigator that may change in flight; the goal stays.
+
+    Another planner stops the robot, which then plans anew. Otherwise the plan stays.
+    """
+    before, after = navigator.params, configuration.navigator
     footprint = navigator.global_costmap.footprint
-    navigator.set_params(configuration.navigator)
-    navigator.peers.params = configuration.peers
     navigator.global_costmap.reconfigure(_global_costmap(configuration))
     navigator.local_costmap.reconfigure(_local_costmap(configuration))
     new_footprint = navigator.global_costmap.footprint
+    local_footprint = navigator.local_costmap.footprint
+    # A user's class may refuse: the rest follows only when both planners are there.
+    if after.base_local_planner != before.base_local_planner:
+        controller = build_local_planner(configuration, local_footprint)
+    else:
+        controller = navigator.controller
+    if after.base_global_planner != before.base_global_planner:
+        planner = build_global_planner(configuration.global_planner, new_footprint)
+        navigator.change_planner(planner)
     # A user's planner has no parameters that change, and may hold a state of its own.
-    if not isinstance(configuration.global_planner, Plugin) or not np.array_equal(
+    elif not isinstance(configuration.global_planner, Plugin) or not np.array_equal(
         footprint, new_footprint
     ):
         navigator.set_planner(build_global_planner(configuration.global_planner, new_footprint))
-    if not isinstance(configuration.local_planner, Plugin):
+    navigator.set_params(after)
+    navigator.peers.params = configuration.peers
+    if controller is not navigator.controller:
+        navigator.change_controller(controller)
+        _slow_down(navigator, configuration)
+    elif not isinstance(configuration.local_planner, Plugin):
         navigator.set_controller_params(configuration.local_planner)
-    navigator.controller.set_footprint(navigator.local_costmap.footprint)
+    controller.set_footprint(local_footprint)
+
+
+def _slow_down(navigator: Navigator, configuration: Configuration) -> None:
+    """Let recoveries limit the speeds of the local planner in use."""
+    for named, (_, params) in zip(navigator.recoveries, configuration.recoveries):
+        if isinstance(params, MoveSlowAndClearParams) and isinstance(
+            named.behaviour, MoveSlowAndClear
+        ):
+            named.behaviour.params = params
 
 
 def _made(makers: Mapping[type, Callable[..., Any]], params: Any, *arguments: Any) -> Any:
@@ -125,6 +145,19 @@ def _made(makers: Mapping[type, Callable[..., Any]], params: Any, *arguments: An
 def build_global_planner(params: Any, footprint: NDArray[np.float64]) -> GlobalPlanner:
     """Build a global planner from its parameters and the footprint, float64[n, 2]."""
     planner: GlobalPlanner = _made(GLOBAL_PLANNERS, params, footprint)
+    return planner
+
+
+def build_local_planner(
+    configuration: Configuration, footprint: NDArray[np.float64]
+) -> LocalPlanner:
+    """Build the local planner of a configuration for a footprint, float64[n, 2]."""
+    planner: LocalPlanner = _made(
+        LOCAL_PLANNERS,
+        configuration.local_planner,
+        footprint,
+        configuration.local_planner_period_s,
+    )
     return planner
 
 

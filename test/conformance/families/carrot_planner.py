@@ -14,8 +14,6 @@ from quad_nav.errors import PlanningError
 from quad_nav.geometry import Pose2D
 from quad_nav.plan.carrot import Carrot
 
-_METRES = _RADIANS = 1e-9
-
 
 def check(path: Path) -> List[Difference]:
     case, comparison = load_case(path), Comparison()
@@ -34,5 +32,5 @@ def check(path: Path) -> List[Difference]:
     comparison.exact("found", len(plan) > 0, meta["found"])
     comparison.exact("costmap", costs, recorded["costmap"])
     if meta["found"]:  # the original leaves a plan behind when it finds none
-        compare_plans(comparison, "plan", plan, recorded["plan"], _METRES, _RADIANS)
+        compare_plans(comparison, "plan", plan, recorded["plan"])
     return comparison.differences

@@ -14,10 +14,6 @@ from quad_nav.errors import PlanningError
 from quad_nav.geometry import Pose2D
 from quad_nav.plan.global_planner import SearchPlanner
 
-_METRES = 1e-5
-# Half a cell apart, two points with that tolerance give a direction to within this.
-_RADIANS = 2e-3
-
 
 def check(path: Path) -> List[Difference]:
     case, comparison = load_case(path), Comparison()
@@ -35,5 +31,5 @@ def check(path: Path) -> List[Difference]:
         plan = NO_PLAN
     comparison.exact("found", len(plan) > 0, meta["found"])
     comparison.exact("grid_after", costs, recorded["grid_after"])
-    compare_plans(comparison, "plan", plan, recorded["plan"], _METRES, _RADIANS)
+    compare_plans(comparison, "plan", plan, recorded["plan"])
     return comparison.differences

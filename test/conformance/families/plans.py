@@ -5,23 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from families.comparison import Comparison
-from quad_nav.geometry import angle_difference, yaw_from_quaternion
+from quad_nav.geometry import quaternion_from_yaw
 
 NO_PLAN = np.zeros((0, 3))
 
 
 def compare_plans(
-    comparison: Comparison,
-    field: str,
-    plan: np.ndarray,
-    recorded: np.ndarray,
-    tolerance_m: float,
-    tolerance_rad: float,
+    comparison: Comparison, field: str, plan: np.ndarray, recorded: np.ndarray
 ) -> None:
-    """plan: float64[n, 3]; recorded: float64[n, 7], x, y, z, qx, qy, qz, qw."""
-    comparison.near(field, plan[:, :2], recorded[:, :2], tolerance_m)
-    turns = [
-        angle_difference(yaw, yaw_from_quaternion(quaternion))
-        for yaw, quaternion in zip(plan[:, 2], recorded[:, 3:])
-    ]
-    comparison.near(f"{field} (yaw, apart)", turns, np.zeros(len(turns)), tolerance_rad)
+    """To the last bit. plan: float64[n, 3]; recorded: float64[n, 7], x, y, z, qx, qy, qz, qw."""
+    poses = [(x, y, 0.0, *quaternion_from_yaw(yaw)) for x, y, yaw in plan.tolist()]
+    comparison.exact(field, np.reshape(poses, (-1, 7)), recorded)

@@ -139,15 +139,56 @@ def test_planners_without_reconfigurable_parameters():
         updated(load({}), "NavfnROS", {})
 
 
-def test_planners_cannot_change_in_flight():
-    with pytest.raises(
-        InputError,
-        match="^base_global_planner: planners cannot change in flight, got 'navfn/NavfnROS';"
-        " expected global_planner/GlobalPlanner$",
-    ):
-        updated(load(SEARCH), "", {"base_global_planner": "navfn/NavfnROS"})
-    same = updated(load(SEARCH), "", {**SEARCH, "planner_frequency": 1.0})
-    assert same.navigator.planner_frequency_hz == 1.0
+def test_another_planner_has_the_parameters_of_its_namespace():
+    """Those that were loaded, or those that a parameter server has by now."""
+    tree = {"DWAPlannerROS": {"max_vel_x": 0.3}, "controller_frequency": 5.0}
+    changed = updated(load(tree), "", DWA)
+    assert changed.local_planner == DwaParams(max_vel_x_mps=0.3)
+    assert changed.local_planner_period_s == 0.2
+    assert changed.to_tree()["DWAPlannerROS"]["max_vel_x"] == 0.3
+    stored = {"DWAPlannerROS": {"max_vel_x": 0.2}}
+    assert updated(load(tree), "", DWA, stored).local_planner.max_vel_x_mps == 0.2
+    with pytest.raises(InputError, match="DWAPlannerROS/max_vel_x: 'fast' is not a number"):
+        updated(load({"DWAPlannerROS": {"max_vel_x": "fast"}}), "", DWA)
+
+
+def test_defaults_of_another_planner_are_restored_as_it_was_loaded():
+    changed = updated(load({"DWAPlannerROS": {"max_vel_x": 0.3}}), "", DWA)
+    changed = updated(changed, "DWAPlannerROS", {"max_vel_x": 0.2})
+    changed = updated(changed, "DWAPlannerROS", {"restore_defaults": True})
+    assert changed.local_planner.max_vel_x_mps == 0.3
+    restored = updated(changed, "", {"restore_defaults": True})
+    assert restored.navigator.base_local_planner == "base_local_planner/TrajectoryPlannerROS"
+
+
+@pytest.mark.parametrize("name", ["NavfnROS", "sbpl/SBPLLatticePlanner", "no.such.Planner", ""])
+def test_an_unknown_planner_is_refused_in_flight(name):
+    with pytest.raises(InputError, match="^/base_global_planner: "):
+        updated(load({}), "", {"base_global_planner": name})
+
+
+@pytest.mark.parametrize(
+    "key, name", [(key, name) for key, slot in planners.SLOTS.items() for name in slot.types]
+)
+def test_planners_change_in_flight_and_back(key, name):
+    """Nothing of the planner is left behind, speed limits of recoveries included."""
+    listed = {"name": "slow", "type": "move_slow_and_clear/MoveSlowAndClear"}
+    before = load({"recovery_behaviors": [listed]})
+    navigator = build_navigator(before)
+    [(_, slow)] = before.recoveries
+    changed = updated(before, "", {key: name})
+    apply_configuration(navigator, changed)
+    params = navigator.planner.params, navigator.controller.params
+    assert params == (changed.global_planner, changed.local_planner)
+    fields = navigator.recoveries[0].behaviour.params.translation_fields
+    assert fields and all(hasattr(changed.local_planner, field) for field in fields)
+    back = updated(changed, "", {key: before.to_tree()[key]})
+    apply_configuration(navigator, back)
+    assert (back.global_planner, back.local_planner) == (
+        before.global_planner,
+        before.local_planner,
+    )
+    assert navigator.recoveries[0].behaviour.params == slow
 
 
 @pytest.mark.parametrize(

@@ -51,8 +51,6 @@ FAULTS = """
 {local_costmap: {footprint: '[[0, 1], [1, 0], [x, 1]]'}}
     local_costmap/footprint: '[[0, 1], [1, 0], [x, 1]]': 'x' is not a number; expected a list [[x1,
     y1], [x2, y2], [x3, y3], ...] of metres
-{recovery_behaviors: none}
-    recovery_behaviors: 'none' is not a list; expected a list of {name: , type: }
 {recovery_behaviors: [{name: clear, type: ClearCostmapRecovery}], clear: {layer_names:
 obstacle_layer}}
     clear/layer_names: 'obstacle_layer' is not a list of names; expected names of layers, as in
@@ -114,9 +112,18 @@ REMARKS = """
 {recovery_behaviors: [{name: clear, type: ClearCostmapRecovery}], clear: {affected_maps: all}}
     caution: clear/affected_maps: 'all' clears both; expected local, global or both
 {recovery_behaviors: [{name: back, type: twist_recovery/TwistRecovery}]}
-    unsupported: recovery_behaviors/back: twist_recovery/TwistRecovery is not supported, skipping
-    this behaviour; expected one of clear_costmap_recovery/ClearCostmapRecovery,
-    rotate_recovery/RotateRecovery, move_slow_and_clear/MoveSlowAndClear
+    unsupported: recovery_behaviors/back: twist_recovery/TwistRecovery is not supported; expected
+    one of clear_costmap_recovery/ClearCostmapRecovery, rotate_recovery/RotateRecovery,
+    move_slow_and_clear/MoveSlowAndClear; flying with the default recoveries instead
+{recovery_behaviors: none}
+    caution: recovery_behaviors: 'none' is not a list; expected a list of {name: , type: }; flying
+    with the default recoveries instead
+{recovery_behaviors: [{name: turn}]}
+    caution: recovery_behaviors: {'name': 'turn'} is not a behaviour; expected {name: , type: };
+    flying with the default recoveries instead
+{recovery_behaviors: [{name: a, type: RotateRecovery}, {name: a, type: ClearCostmapRecovery}]}
+    caution: recovery_behaviors: 'a' is used twice; expected unique names; flying with the default
+    recoveries instead
 {recovery_behaviors: [{name: slow, type: MoveSlowAndClear}], slow: {planner_namespace:
 DWAPlannerROS, max_trans_param_name: max_vel_trans}}
     caution: slow/planner_namespace: DWAPlannerROS is not the local planner; limiting
@@ -193,7 +200,6 @@ def test_all_faults_are_reported_at_once():
     told = problems(
         {
             "conservative_reset_dist": "far",
-            "recovery_behaviors": 1,
             "TrajectoryPlannerROS": {"sim_time": 0},
             "NavfnROS": {"allow_unknown": "no"},
             "global_costmap": {"width": None},
@@ -207,7 +213,6 @@ def test_all_faults_are_reported_at_once():
         "/nav/global_costmap/width",
         "/nav/local_costmap/cost_scaling_factor",  # where it was written, not where it goes
         "/nav/local_costmap/circumscribed_radius",
-        "/nav/recovery_behaviors",
     ]
 
 
@@ -275,6 +280,23 @@ def test_listed_recoveries_keep_their_order_and_parameters():
         ("look", "rotate_recovery/RotateRecovery"),
         ("forget", "clear_costmap_recovery/ClearCostmapRecovery"),
     )
+
+
+@pytest.mark.parametrize(
+    "listed",
+    [
+        3,
+        ["rotate_recovery"],
+        [{"name": "turn", "type": "RotateRecovery"}, {"name": "x", "type": "my_cpp/Recovery"}],
+        [{"name": "turn", "type": "RotateRecovery"}, {"name": "turn", "type": "RotateRecovery"}],
+    ],
+)
+def test_a_list_of_recoveries_with_a_mistake_leaves_the_default_ones(listed):
+    flown = load({"recovery_behaviors": listed}, "")
+    assert flown.recoveries == load({}, "").recoveries
+    assert len(flown.recoveries) == 4
+    assert load(flown.to_tree(), "").recoveries == flown.recoveries
+    assert load({"recovery_behaviors": []}, "").recoveries == ()  # as it was written
 
 
 def test_move_slow_limits_every_speed_of_the_planner():

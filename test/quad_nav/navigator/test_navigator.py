@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -266,11 +267,21 @@ def test_local_from_global_transforms_the_global_pose_to_the_local_one():
 
 
 def test_rings_around_a_goal():
-    first = list(ring_offsets(0.15, 0.15))
+    first = list(ring_offsets(0.25, 0.75, 0.75))
     # The axis points once each, the corners with both signs: 8 points of one ring.
     assert len(first) == len(set(first)) == 8
-    assert set(first) == {(x, y) for x in (-0.15, 0, 0.15) for y in (-0.15, 0, 0.15)} - {(0, 0)}
-    assert list(ring_offsets(0.15, 0.1)) == []
+    assert set(first) == {(x, y) for x in (-0.75, 0, 0.75) for y in (-0.75, 0, 0.75)} - {(0, 0)}
+
+
+def test_rings_are_summed_in_single_precision():
+    third, tenth = float(np.float32(0.3)), float(np.float32(0.1))
+    two = list(ring_offsets(0.05, third, third))
+    assert two[0] == (-0.15000000596046448, 0.0)
+    assert two[8] == (-0.30000001192092896, 0.0)
+    assert len(two) == 8 + 16
+    assert list(ring_offsets(0.05, tenth, tenth))[0] == (-tenth, 0.0)
+    assert list(ring_offsets(0.05, third, tenth)) == []
+    assert list(ring_offsets(0.05, math.inf, math.nan)) == []
 
 
 def test_shutdown_costmaps_skips_updates_without_a_goal():
@@ -280,3 +291,86 @@ def test_shutdown_costmaps_skips_updates_without_a_goal():
     flight.navigator.set_goal(GOAL, flight.now_s)
     flight.until(4.0)
     assert len(flight.global_costmap.updates) >= 5
+
+
+@pytest.mark.parametrize("tree, at_s", [(ALONE, 1.0), (UPSTREAM, 1.1)])
+@pytest.mark.parametrize("kind", ["planner", "controller"])
+def test_another_planner_stops_the_robot_which_plans_anew(tree, at_s, kind):
+    flight = Flight(tree=tree)
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(0.92)
+    flight.now_s = 0.95
+    assert flight.planner.calls == 1
+    if kind == "planner":
+        flight.planner = FakePlanner()
+        flight.navigator.change_planner(flight.planner)
+    else:
+        flight.controller = FakeController()
+        flight.navigator.change_controller(flight.controller)
+    assert flight.navigator.has_work
+    stopped = flight.until(at_s - 0.01)
+    assert {tick.command for tick in stopped if tick.command} == {Twist2D()}
+    assert stopped[0].command == Twist2D()
+    flown = [tick for tick in flight.until(2.0) if tick.command is not None]
+    assert flown[0].now_s == pytest.approx(at_s)
+    assert {tick.command for tick in flown} == {FORWARD}
+    assert flight.planner.calls == (1 if kind == "planner" else 2)
+    assert len(flight.controller.plans) == (2 if kind == "planner" else 1)
+
+
+def test_another_planner_ends_a_recovery_and_an_idle_robot_stays_idle():
+    recovery = FakeRecovery(steps=200)
+    flight = Flight([NamedRecovery("rotate", recovery)], ALONE, planner_patience_s=0.5)
+    flight.planner.fails = True
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(2.0)
+    assert flight.navigator.state is State.CLEARING
+    flight.navigator.change_planner(FakePlanner())
+    flight.until(2.2)
+    assert flight.navigator.state is State.CONTROLLING
+    flight.navigator.cancel()
+    flight.navigator.change_controller(FakeController())
+    assert flight.until(3.0)[-1].state is State.IDLE
+
+
+def test_retries_of_upstream_take_no_time():
+    """3 retries at 5 Hz with two recoveries: the abort comes after five periods, as recorded."""
+    recoveries = [NamedRecovery(f"r{k}", FakeRecovery()) for k in range(2)]
+    flight = Flight(recoveries, controller_frequency_hz=5.0, max_planning_retries=3)
+    flight.planner.fails = True
+    flight.navigator.set_goal(GOAL, 0.0)
+    assert [tick.now_s for tick in flight.until(5.0) if tick.outcome] == [pytest.approx(1.0)]
+
+
+@pytest.mark.parametrize("tree, at_s", [(ALONE, 1.5), (UPSTREAM, 4.0)])
+def test_a_recovery_of_upstream_delays_goals(tree, at_s):
+    """The rotation lasts for 4 s or so; a control cycle follows it at once."""
+    recovery = FakeRecovery(steps=60, period_s=0.05)
+    flight = Flight([NamedRecovery("rotate", recovery)], tree, planner_patience_s=0.5)
+    flight.planner.fails = True
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(1.4)
+    assert recovery.started == 1
+    while not flight.navigator.accepts_goal(flight.now_s):
+        flight.until(flight.now_s)
+    assert flight.now_s == pytest.approx(at_s, abs=0.5)
+
+
+@pytest.mark.parametrize("tree, commands", [(ALONE, [Twist2D()]), (UPSTREAM, [FORWARD])])
+def test_upstream_commands_once_more_before_it_recovers_from_oscillation(tree, commands):
+    flight = Flight([NamedRecovery("r", FakeRecovery())], tree, oscillation_timeout_s=2.0)
+    flight.navigator.set_goal(GOAL, 0.0)
+    entered = [tick for tick in flight.until(2.15) if tick.state is State.CLEARING]
+    assert [tick.command for tick in entered] == commands
+
+
+@pytest.mark.parametrize("tree, recovers", [(ALONE, False), (UPSTREAM, True)])
+def test_upstream_recovers_when_its_pose_is_lost(tree, recovers):
+    flight = Flight([NamedRecovery("r", FakeRecovery())], tree, planner_patience_s=2.0)
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(1.0)
+    flight.pose = None
+    ticks = flight.until(5.0)
+    assert any(tick.recovery for tick in ticks) is recovers
+    before = [tick.command for tick in ticks if not tick.recovery and tick.command]
+    assert set(before) == {Twist2D()}

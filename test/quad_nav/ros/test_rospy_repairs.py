@@ -195,3 +195,22 @@ def test_fifty_nodes_connect_while_one_accepts_none(monkeypatch):
         for _ in range(50):
             address = waiting.getsockname()
             opened.enter_context(socket.create_connection(address, timeout=0.9))
+
+
+def test_an_alarm_ends_a_sleep(ros):
+    """The sleep of a stopped clock; the next one is over with its time."""
+    alarm = rospy_repairs.Alarm()
+    sleeper = threading.Thread(target=alarm.sleep, args=(1000.0,))
+    sleeper.start()
+    alarm.set()
+    sleeper.join(10.0)
+    assert not sleeper.is_alive()
+    alarm.set()
+    alarm.sleep(1000.0)  # it was set before
+    sleeper = threading.Thread(target=alarm.sleep, args=(0.5,))
+    sleeper.start()
+    now_s = 1.0
+    while sleeper.is_alive():
+        now_s += 0.1
+        ros.set_time(now_s)
+        sleeper.join(0.01)

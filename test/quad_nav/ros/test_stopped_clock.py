@@ -97,9 +97,11 @@ def test_a_clock_is_named_where_there_is_one(ros, wall, monkeypatch, has_clock, 
         step=lambda _: None,
         restart=lambda _: None,
         discard_late_scans=lambda: None,
+        on_request=lambda _: None,
+        has_request=False,
     )
     monkeypatch.setattr(loop, "is_wallclock", lambda: not has_clock)
-    monkeypatch.setattr(rospy, "sleep", sleep)
+    monkeypatch.setattr(loop, "Alarm", lambda: SimpleNamespace(set=None, sleep=sleep))
     monkeypatch.setattr(rospy, "is_shutdown", lambda: not steps)
     monkeypatch.setattr(loop, "publish_health", lambda _: None)
     NavigatorLoop([robot], [], 0.001).run()

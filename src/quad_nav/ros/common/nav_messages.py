@@ -37,21 +37,29 @@ def goal_from_message(message: Pose) -> Pose3D:
 
     Raises:
         InvalidGoal: If the position is not finite or too large, or the rotation is not about z.
-            The text for quaternions is that of C++ move_base.
     """
     pose = pose_from_message(message)
     if not (np.abs(pose.translation) <= MAX_MAGNITUDE).all():
         raise InvalidGoal(
             f"Aborting on goal because its position is not finite or beyond {MAX_MAGNITUDE:g} m"
         )
+    return upright(pose)
+
+
+def upright(pose: Pose3D) -> Pose3D:
+    """Return a pose with its quaternion normalised.
+
+    Raises:
+        InvalidGoal: If the rotation is not about z. The text is that of C++ move_base.
+    """
     length = math.sqrt(sum(part * part for part in pose.quaternion))
     if not math.isfinite(length) or length < 1e-3:
         raise InvalidGoal(INVALID_QUATERNION)
     x, y, z, w = pose.quaternion
-    upright = Pose3D(pose.x_m, pose.y_m, pose.z_m, (x / length, y / length, z / length, w / length))
-    if abs(upright.rotation[2, 2] - 1.0) > 1e-3:
+    unit = Pose3D(pose.x_m, pose.y_m, pose.z_m, (x / length, y / length, z / length, w / length))
+    if abs(unit.rotation[2, 2] - 1.0) > 1e-3:
         raise InvalidGoal(INVALID_QUATERNION)
-    return upright
+    return unit
 
 
 def planar_pose(pose: Pose2D, z_m: float = 0.0) -> Pose3D:

@@ -9,9 +9,11 @@
 * It registers once. A ROS master that is started again does not know the node: nobody finds its
   services, and new nodes do not connect to its topics. Those that are connected stay so.
 * Each log call reads a parameter, and asks the master for it as long as it is not set.
+* Its services always say something when they refuse; those of roscpp send an empty text.
 * It connects a subscriber to publishers of its own process too, through a socket.
 * It has no public way to set the time, to add a callback to a subscriber, to ask whether a
-  publisher reaches a node, to send bytes, and to read from which node and topic a message came.
+  publisher reaches a node, to send bytes, to read from which node and topic a message came, and to
+  end a sleep.
 
 No other file touches what is private in rospy.
 """
@@ -49,6 +51,7 @@ _ASK_AGAIN_S = 1.0
 _SHUTDOWN_S = 2.0
 _POLL_S = 0.1
 _WATCH_S = 2.0
+_REFUSED_WITHOUT_TEXT = "service cannot process request: "
 _START_SERVICE = "/simulation/start"
 _ROSOUT_PARAMETER = "/rosout_disable_topics_generation"
 _connect_topic: Callable[..., Tuple[int, str, int]] = ROSHandler._connect_topic
@@ -122,6 +125,17 @@ def reaches(publisher: rospy.Publisher, node: str) -> bool:
     return bool(publisher.impl.has_connection(node))
 
 
+def refuse_without_text(service: rospy.Service) -> None:
+    """Let a service that raises ``rospy.ServiceException("")`` refuse as roscpp's do."""
+
+    def write(transport: Any, text: str) -> None:
+        if text == _REFUSED_WITHOUT_TEXT:
+            text = ""
+        type(service)._write_service_error(service, transport, text)
+
+    service._write_service_error = write
+
+
 def accept_many_connections() -> None:
     """Let more nodes connect to this one at the same time."""
     server = init_tcpros_server()
@@ -169,6 +183,34 @@ def _register_if_unknown(master: rosgraph.Master) -> None:
         publishers = master.registerSubscriber(topic, kind, node)
         ServerProxy(node).publisherUpdate("/master", topic, publishers)
     rospy.logwarn("%s: registered again: the ROS master was restarted", rospy.get_name())
+
+
+class Alarm:
+    """A sleep by ROS's time that another thread may end."""
+
+    def __init__(self) -> None:
+        self._is_set = threading.Event()
+
+    def set(self) -> None:
+        """End the sleep that goes on, or else the next one."""
+        self._is_set.set()
+        condition = rospy.rostime.get_rostime_cond()
+        with condition:
+            condition.notify_all()
+
+    def sleep(self, seconds: float) -> None:
+        """Sleep until the time is over, the alarm is set, the clock jumps back or ROS ends."""
+        begin_s, condition = rospy.get_time(), rospy.rostime.get_rostime_cond()
+        patience_s = seconds if rospy.rostime.is_wallclock() else _POLL_S
+
+        def is_over() -> bool:
+            slept_s = rospy.get_time() - begin_s
+            return self._is_set.is_set() or not 0.0 <= slept_s < seconds
+
+        with condition:
+            while not rospy.is_shutdown() and not condition.wait_for(is_over, patience_s):
+                pass
+        self._is_set.clear()
 
 
 def set_time(now: rospy.Time) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import threading
-from typing import Iterable, List, Optional, Sequence, Tuple
+from typing import Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 import rospy
 import tf2_ros
@@ -33,6 +33,13 @@ class TransformUnavailable(NavigationError):
     def __init__(self, message: str, later: bool = False) -> None:
         super().__init__(excerpt(message, 500))
         self.later = later
+
+
+class LocatedPose(NamedTuple):
+    """A pose in a frame, and the time of the transform that it is from."""
+
+    pose: Pose3D
+    stamp_s: float
 
 
 class Transforms:
@@ -171,17 +178,17 @@ class Transforms:
 
     def locate(
         self, to_frame: str, base_frame: str, now_s: float, tolerance_s: float
-    ) -> Optional[Pose3D]:
+    ) -> Optional[LocatedPose]:
         """Return the robot's latest pose; None if unknown or older than the tolerance."""
         try:
             pose, stamp_s = self._lookup(to_frame, base_frame, None)
         except TransformUnavailable:
             return None
-        return pose if now_s - stamp_s <= tolerance_s else None
+        return LocatedPose(pose, min(stamp_s, now_s)) if now_s - stamp_s <= tolerance_s else None
 
     def locate_in(
         self, wanted: Sequence[Tuple[str, str, float]], now_s: float
-    ) -> List[Optional[Pose3D]]:
+    ) -> List[Optional[LocatedPose]]:
         """Call `locate` once for each distinct (to_frame, base_frame, tolerance_s)."""
         found = {one: self.locate(one[0], one[1], now_s, one[2]) for one in dict.fromkeys(wanted)}
         return [found[one] for one in wanted]

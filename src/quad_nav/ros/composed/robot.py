@@ -15,7 +15,7 @@ from quad_nav.geometry import Pose3D, Scan, Twist2D
 from quad_nav.loop.navigator_group import LoopRobot
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.peers.peer import Peer
-from quad_nav.ros.common.transforms import Transforms
+from quad_nav.ros.common.transforms import LocatedPose, Transforms
 from quad_nav.ros.navigator import sensors, static_maps
 from quad_nav.ros.navigator.health_meters import InputMeter
 from quad_nav.ros.navigator.intention_topics import robot_publisher
@@ -117,7 +117,7 @@ class ComposedRobot(LoopRobot):
                 tick, located = super().navigate(now_s, state, peers)
                 in_global = self._in_costmaps(state.map_from_base, now_s)
                 frame = self.navigator.global_costmap.params.global_frame
-                self.interface.publish(tick, in_global[frame], located)
+                self.interface.publish(tick, LocatedPose(in_global[frame], now_s), located)
             except PluginError as error:
                 self.interface.abort(error)
                 return Tick(now_s, command=Twist2D()), RobotPoses(None, None)

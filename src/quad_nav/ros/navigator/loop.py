@@ -10,6 +10,7 @@ from rospy.rostime import is_wallclock
 
 from quad_nav.ros.common.diagnostics import publish_health
 from quad_nav.ros.common.readiness import TopicWatch
+from quad_nav.ros.common.rospy_repairs import Alarm
 from quad_nav.ros.navigator.health_meters import LoopHealth
 from quad_nav.ros.navigator.peer_topics import PeerTopics
 from quad_nav.ros.navigator.robot_navigator import POLL_S, RobotNavigator
@@ -39,12 +40,14 @@ class NavigatorLoop:
         )
         self._health = LoopHealth({robot.name: robot.health for robot in robots})
         self._start_s = self._now_s = 0.0
+        self._alarm = Alarm()
         self._wall_s: Optional[float] = None  # of the clock's last step
 
     def run(self) -> None:
         """Wait for the clock, then serve the robots until ROS shuts down."""
         publish_health(self._health.read)
         for robot in self._robots:
+            robot.on_request(self._alarm.set)
             rospy.on_shutdown(robot.stop)
         while rospy.get_time() == 0.0 and not rospy.is_shutdown():
             self._topic_watch.check_clock()
@@ -66,10 +69,7 @@ class NavigatorLoop:
                 continue
             self._step(self._now_s)
             due_s = min(robot.due_s for robot in self._robots)
-            try:
-                rospy.sleep(min(max(due_s - rospy.get_time(), self._period_s), POLL_S))
-            except rospy.exceptions.ROSTimeMovedBackwardsException:
-                continue
+            self._alarm.sleep(min(max(due_s - rospy.get_time(), self._period_s), POLL_S))
 
     def _update_time(self) -> float:
         """Take the time; return how long the clock stood still, in wall time, 0 until it moves.
@@ -99,7 +99,7 @@ class NavigatorLoop:
         for one in self._peers:
             one.refresh(now_s)
         late_s = now_s - max(min(robot.due_s for robot in self._robots), self._start_s)
-        self._health.update(now_s, late_s)
+        self._health.update(now_s, max(late_s, 0.0))
         if late_s > LATE_S:
             rospy.logwarn_throttle(
                 WARN_AGAIN_S,
@@ -107,6 +107,6 @@ class NavigatorLoop:
                 " lower rate:=, fewer robots or more hosts:=)",
             )
         for robot in self._robots:
-            if is_due(robot.due_s, now_s):
+            if robot.has_request or is_due(robot.due_s, now_s):
                 robot.step(now_s)
         self._topic_watch.check()

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import functools
 import threading
-from typing import Callable
+from typing import Callable, List, Optional, Tuple
 
+import numpy as np
 import rospy
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Path
 from nav_msgs.srv import GetPlan, GetPlanRequest, GetPlanResponse
+from std_msgs.msg import Header
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from quad_nav.config.plugins import plugin_name
-from quad_nav.errors import InvalidGoal, PlanningError
+from quad_nav.errors import InvalidGoal, NoPath, PlanningError
 from quad_nav.geometry import Pose2D
 from quad_nav.navigator.tick import RobotPoses, State
+from quad_nav.plan.carrot import Carrot
+from quad_nav.ros.common.conversions import pose_from_message
 from quad_nav.ros.common.nav_messages import goal_from_message, path_message
+from quad_nav.ros.common.rospy_repairs import refuse_without_text
 from quad_nav.ros.navigator.plan_topics import PlanTopics
 from quad_nav.scenario.navigator_host import NavigatorHost
 from quad_nav.topics.publishing import Names
@@ -36,64 +44,108 @@ class PlanServices:
     ) -> None:
         """Advertise the services; ``lock`` guards the navigator."""
         self._host, self._navigator = host, host.navigator
-        self._topics, self._lock, self._locate = topics, lock, locate
-        planner = plugin_name(host.navigator.params.base_global_planner)
+        self._topics, self._lock, self._locate, self._names = topics, lock, locate, names
+        self._frame = host.navigator.global_costmap.params.global_frame
         self._services = [
             rospy.Service(names("~make_plan"), GetPlan, self._make_plan),
-            rospy.Service(names(f"~{planner}/make_plan"), GetPlan, self._make_planner_plan),
             rospy.Service(names("~clear_costmaps"), Empty, self._clear_costmaps),
         ]
+        refuse_without_text(self._services[0])
+        self._make_plan_name = self._services[0].resolved_name
+        self._of_planner: List[rospy.Service] = []
+        self.change_planner()
+
+    def change_planner(self) -> None:
+        """Advertise the service of the global planner in use, and that of no other one."""
+        planner = plugin_name(self._navigator.params.base_global_planner)
+        name = rospy.resolve_name(self._names(f"~{planner}/make_plan"))
+        if [one.resolved_name for one in self._of_planner] == [name]:
+            return
+        for service in self._of_planner:
+            service.shutdown()
+        self._of_planner = []
+        if not isinstance(self._navigator.planner, Carrot):
+            handler = functools.partial(self._make_planner_plan, name)
+            self._of_planner.append(rospy.Service(name, GetPlan, handler))
 
     def _make_plan(self, request: GetPlanRequest) -> GetPlanResponse:
         with self._lock:
             if self._navigator.state is not State.IDLE:
-                raise rospy.ServiceException(
+                raise self._refusal(
                     "move_base must be in an inactive state to make a plan for an external user"
                 )
-            if self._navigator.params.make_plan_clear_costmap:
+            here, start = self._locate(), None
+            if not request.start.header.frame_id:
+                start = here.in_global
+                if start is None:
+                    raise self._refusal("the robot pose is unknown")
+            params = self._navigator.params
+            if params.make_plan_clear_costmap:
                 radius_m = self._host.configuration.clearing_radius_m
-                self._navigator.free_surroundings(self._locate(), radius_m)
-            return self._plan_response(request)
+                self._navigator.free_surroundings(here, radius_m)
+            poses, is_near = self._poses(self._make_plan_name, request, start, request.tolerance)
+            if is_near and params.make_plan_add_unreachable_goal:
+                poses.append(request.goal)
+            return GetPlanResponse(Path(poses=poses))
 
-    def _make_planner_plan(self, request: GetPlanRequest) -> GetPlanResponse:
+    def _make_planner_plan(self, name: str, request: GetPlanRequest) -> GetPlanResponse:
+        """Plan from pose to pose, as the planners' own services do: the tolerance is not read."""
         with self._lock:
-            return self._plan_response(request)
+            poses, _ = self._poses(name, request, None, 0.0)
+            return GetPlanResponse(Path(Header(0, rospy.Time.now(), self._frame), poses))
 
-    def _plan_response(self, request: GetPlanRequest) -> GetPlanResponse:
-        frame = self._navigator.global_costmap.params.global_frame
-        self._check_frame("goal", request.goal.header.frame_id, frame)
-        if request.start.header.frame_id:
-            self._check_frame("start", request.start.header.frame_id, frame)
-        if not abs(request.tolerance) <= MAX_TOLERANCE_M:
-            # Every cell within it may be planned to, while the robot stands still.
-            raise rospy.ServiceException(
-                f"tolerance {request.tolerance:g} m, expected {MAX_TOLERANCE_M:g} m at most"
-            )
-        try:
-            goal = goal_from_message(request.goal.pose).to_2d()
-            plan = self._navigator.make_plan(self._start(request), goal, request.tolerance)
-        except InvalidGoal as error:
-            raise rospy.ServiceException(str(error)) from error
-        except PlanningError as error:
-            rospy.logwarn("%s: no plan: %s", self._services[0].resolved_name, error)
-            return GetPlanResponse()
+    def _refusal(self, reason: str) -> rospy.ServiceException:
+        """Return the error that a client gets; the original says nothing."""
+        rospy.logerr("%s: refused: %s", self._make_plan_name, reason)
+        explains = self._navigator.params.check_goals
+        return rospy.ServiceException(reason if explains else "")
+
+    def _poses(
+        self, name: str, request: GetPlanRequest, start: Optional[Pose2D], tolerance_m: float
+    ) -> Tuple[List[PoseStamped], bool]:
+        """Plan, and publish what was found; ``name`` is the service's.
+
+        Returns:
+            The poses, none without a plan, and True if they lead to a point beside the goal.
+        """
         now = rospy.Time.now()
+        try:
+            goal = self._in_plane("goal", request.goal)
+            start = start or self._in_plane("start", request.start)
+            if self._navigator.params.check_goals and not tolerance_m <= MAX_TOLERANCE_M:
+                # Every cell within it may be planned to, while the robot stands still.
+                raise InvalidGoal(
+                    f"tolerance {tolerance_m:g} m, expected {MAX_TOLERANCE_M:g} m at most"
+                )
+            plan, is_near = self._navigator.plan_near(start, goal, tolerance_m)
+        except (InvalidGoal, PlanningError) as error:
+            rospy.logwarn("%s: no plan: %s", name, error)
+            if isinstance(error, NoPath):
+                self._topics.publish_no_plan(now)
+            return [], False
         self._topics.publish_plan(plan, now)
-        response = GetPlanResponse()
-        response.plan.poses = path_message(plan, frame, now).poses
-        return response
+        poses: List[PoseStamped] = path_message(plan, self._frame, now).poses
+        end, wanted = poses[-1].pose, request.goal.pose
+        end.position.z = wanted.position.z
+        if plan[-1, 2] == goal.yaw_rad:  # planners copy the goal, whatever its quaternion
+            end.orientation = wanted.orientation
+        return poses, is_near
 
-    def _check_frame(self, what: str, frame: str, expected: str) -> None:
-        if frame.lstrip("/") != expected.lstrip("/"):
-            raise rospy.ServiceException(f"the {what} is in frame '{frame}', expected '{expected}'")
+    def _in_plane(self, what: str, message: PoseStamped) -> Pose2D:
+        """Return a pose of a request.
 
-    def _start(self, request: GetPlanRequest) -> Pose2D:
-        if request.start.header.frame_id:
-            return goal_from_message(request.start.pose).to_2d()
-        here = self._locate().in_global
-        if here is None:
-            raise rospy.ServiceException("the robot pose is unknown")
-        return here
+        Raises:
+            InvalidGoal: It is in another frame, or nothing can be planned with it.
+        """
+        is_checked, frame = self._navigator.params.check_goals, message.header.frame_id
+        if (frame.lstrip("/") if is_checked else frame) != self._frame.lstrip("/"):
+            raise InvalidGoal(f"the {what} is in frame '{frame}', expected '{self._frame}'")
+        if is_checked:
+            return goal_from_message(message.pose).to_2d()
+        pose = pose_from_message(message.pose).to_2d()
+        if not np.isfinite((pose.x_m, pose.y_m)).all():
+            raise InvalidGoal(f"the {what} is not on the global costmap")
+        return pose
 
     def _clear_costmaps(self, _: EmptyRequest) -> EmptyResponse:
         with self._lock:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, List
+
 import numpy as np
 import rospy
 from geometry_msgs.msg import Twist
@@ -36,18 +38,10 @@ class PlanTopics:
         self._navigator = navigator
         self._global_frame = navigator.global_costmap.params.global_frame
         self._local_frame = navigator.local_costmap.params.global_frame
-        planner = plugin_name(navigator.params.base_global_planner)
-        controller = plugin_name(navigator.params.base_local_planner)
+        self._names = names
         self._command = rospy.Publisher(names("cmd_vel"), Twist, queue_size=1)
-        self._plan = rospy.Publisher(names(f"~{planner}/plan"), Path, queue_size=2)
-        if isinstance(navigator.planner, SearchPlanner):
-            self._potential = rospy.Publisher(
-                names(f"~{planner}/potential"), OccupancyGrid, queue_size=1
-            )
-        of_controller = names(f"~{controller}")
-        self._global_plan = rospy.Publisher(f"{of_controller}/global_plan", Path, queue_size=1)
-        self._local_plan = rospy.Publisher(f"{of_controller}/local_plan", Path, queue_size=1)
-        self._cost_cloud = rospy.Publisher(f"{of_controller}/cost_cloud", PointCloud2, queue_size=1)
+        self._of_planners: List[rospy.Publisher] = []
+        self.change_planners()
         self._schedule = RobotTopicSchedule()
         self._of_robot = {
             topic.name: rospy.Publisher(
@@ -62,8 +56,31 @@ class PlanTopics:
             names("move_base/recovery_status"), RecoveryStatus, queue_size=1
         )
 
-    def publish(self, tick: Tick, pose: Pose3D) -> None:
-        """Publish the results of a tick; `pose` is the robot's in the global frame."""
+    def change_planners(self) -> None:
+        """Advertise the topics of the planners in use, and those of no other ones.
+
+        A topic that stays is advertised twice for a moment, so that its subscribers stay.
+        """
+        before, self._of_planners = self._of_planners, []
+        params = self._navigator.params
+        planner = f"~{plugin_name(params.base_global_planner)}"
+        controller = f"~{plugin_name(params.base_local_planner)}"
+        self._plan = self._advertise(f"{planner}/plan", Path, 2)
+        if isinstance(self._navigator.planner, SearchPlanner):
+            self._potential = self._advertise(f"{planner}/potential", OccupancyGrid)
+        self._global_plan = self._advertise(f"{controller}/global_plan", Path)
+        self._local_plan = self._advertise(f"{controller}/local_plan", Path)
+        self._cost_cloud = self._advertise(f"{controller}/cost_cloud", PointCloud2)
+        for publisher in before:
+            publisher.unregister()
+
+    def _advertise(self, name: str, type_: Any, queue_size: int = 1) -> rospy.Publisher:
+        publisher = rospy.Publisher(self._names(name), type_, queue_size=queue_size)
+        self._of_planners.append(publisher)
+        return publisher
+
+    def publish(self, tick: Tick, pose: Pose3D, pose_s: float) -> None:
+        """Publish the results of a tick; `pose` is the robot's in the global frame at `pose_s`."""
         now = time_message(tick.now_s)
         for topic, fields in self._schedule.pop(tick, pose.to_2d()):
             publisher = self._of_robot[topic.name]
@@ -72,15 +89,14 @@ class PlanTopics:
             self._command.publish(twist_message(tick.command))
         if tick.plan is not None:
             self.publish_plan(tick.plan, now)
-        if tick.planning_failed and self._plan.get_num_connections() > 0:
-            nothing = path_message(np.zeros((0, 3)), self._global_frame, now)
-            self._plan.publish(nothing)  # removes the previous plan from displays
+        if tick.planning_failed:
+            self.publish_no_plan(now)
         if tick.plan is not None or tick.planning_failed:
             self._publish_potential(now)
         if tick.recovery is not None:
             self._recovery.publish(
                 RecoveryStatus(
-                    pose_stamped(pose, self._global_frame, now),
+                    pose_stamped(pose, self._global_frame, time_message(pose_s)),
                     tick.recovery.index,
                     tick.recovery.total,
                     tick.recovery.name,
@@ -104,6 +120,11 @@ class PlanTopics:
         if isinstance(self._navigator.planner, Navfn):
             self._plan.publish(Path(message.header, message.poses[:-1]))
         self._plan.publish(message)
+
+    def publish_no_plan(self, now: rospy.Time) -> None:
+        """Remove the previous plan from displays."""
+        if self._plan.get_num_connections() > 0:
+            self._plan.publish(path_message(np.zeros((0, 3)), self._global_frame, now))
 
     def _publish_potential(self, now: rospy.Time) -> None:
         planner = self._navigator.planner

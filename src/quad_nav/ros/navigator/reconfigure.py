@@ -7,7 +7,7 @@ the same objects from the dataclasses of the parameters.
 from __future__ import annotations
 
 import types
-from typing import Any, Callable, Dict, List, Sequence
+from typing import Any, Callable, Dict, Sequence
 
 import rospy
 from dynamic_reconfigure.msg import Config
@@ -72,31 +72,51 @@ def config_type(name: str, parameters: Sequence[Parameter]) -> types.SimpleNames
     )
 
 
-def serve_namespaces(
-    robot: str,
-    configuration: config.Configuration,
-    on_reconfigure: OnReconfigure,
-    names: Names,
-) -> List[Server]:
-    """Put a configuration on the parameter server and serve all its namespaces.
+class ParameterServers:
+    """The dynamic_reconfigure servers of all namespaces of a robot."""
 
-    Args:
-        robot: Name of the robot, for the log.
-        configuration: The present configuration.
-        on_reconfigure: Called with a namespace and the changed values in rospy's service threads;
-            returns the configuration then in force. If it raises an `InputError`, nothing changes
-            and the error is logged.
-        names: Names of the robot's parameters and services.
-    """
-    rospy.set_param(names("~"), configuration.to_tree())
-    servers = []
-    for namespace, parameters in config.reconfigurable(configuration).items():
-        name = (namespace or "move_base").replace("/", "_") + "_config"
-        callback = _callback(robot, namespace, configuration, on_reconfigure)
-        values = config.values(configuration, namespace)
-        type_ = config_type(name, parameters)
-        servers.append(ParameterServer(type_, callback, names(f"~{namespace}"), values))
-    return servers
+    def __init__(
+        self,
+        robot: str,
+        configuration: config.Configuration,
+        on_reconfigure: OnReconfigure,
+        names: Names,
+    ) -> None:
+        """Put a configuration on the parameter server and serve its namespaces.
+
+        Args:
+            robot: Name of the robot, for the log.
+            configuration: The present configuration.
+            on_reconfigure: Called with a namespace and the changed values in rospy's service
+                threads; returns the configuration then in force. If it raises an `InputError`,
+                nothing changes and the error is logged.
+            names: Names of the robot's parameters and services.
+        """
+        self._robot, self._on_reconfigure, self._names = robot, on_reconfigure, names
+        self._servers: Dict[str, ParameterServer] = {}
+        rospy.set_param(names("~"), configuration.to_tree())
+        self._serve(configuration)
+
+    def change_planners(self, configuration: config.Configuration) -> None:
+        """Serve the namespaces of the planners in use, and those of no other ones."""
+        wanted = config.reconfigurable(configuration)
+        for namespace in [one for one in self._servers if one not in wanted]:
+            self._servers.pop(namespace).close()
+        tree = configuration.to_tree()
+        for namespace in [one for one in wanted if one not in self._servers]:
+            rospy.set_param(self._names(f"~{namespace}"), tree[namespace])
+        self._serve(configuration)
+
+    def _serve(self, configuration: config.Configuration) -> None:
+        for namespace, parameters in config.reconfigurable(configuration).items():
+            if namespace in self._servers:
+                continue
+            name = (namespace or "move_base").replace("/", "_") + "_config"
+            callback = _callback(self._robot, namespace, configuration, self._on_reconfigure)
+            values = config.values(configuration, namespace)
+            self._servers[namespace] = ParameterServer(
+                config_type(name, parameters), callback, self._names(f"~{namespace}"), values
+            )
 
 
 class ParameterServer(Server):
@@ -110,6 +130,12 @@ class ParameterServer(Server):
         self._stored = dict(values)
         self._warnings = ThrottledWarnings()
         super().__init__(type_, callback, "" if namespace == "~" else namespace)
+
+    def close(self) -> None:
+        """Serve no longer."""
+        self.set_service.shutdown()
+        self.descr_topic.unregister()
+        self.update_topic.unregister()
 
     def _set_callback(self, request: ReconfigureRequest) -> Config:
         """Handle a request without the values that have an unknown name or another type."""

@@ -7,17 +7,18 @@ from: topics, see `robot_navigator`, or the simulation in the same process, see 
 from __future__ import annotations
 
 import threading
-from typing import Any, Dict, Optional, Sequence
+from typing import Any, Callable, Dict, Optional, Sequence, Tuple
 
 import rospy
 
 from quad_nav import config
-from quad_nav.errors import PluginError
-from quad_nav.geometry import Pose3D
+from quad_nav.config.planners import SLOTS
+from quad_nav.config.plugins import plugin_name
+from quad_nav.errors import InputError, PluginError
 from quad_nav.navigator.tick import Outcome, RobotPoses, Tick
 from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
-from quad_nav.ros.common.transforms import Transforms
+from quad_nav.ros.common.transforms import LocatedPose, Transforms
 from quad_nav.ros.navigator import static_maps
 from quad_nav.ros.navigator.costmap_publisher import CostmapPublisher
 from quad_nav.ros.navigator.goal_server import GoalServer
@@ -25,8 +26,9 @@ from quad_nav.ros.navigator.health_meters import InputMeter, NavigatorHealth
 from quad_nav.ros.navigator.obstacle_topics import ObstacleTopics
 from quad_nav.ros.navigator.plan_services import Locate, PlanServices
 from quad_nav.ros.navigator.plan_topics import PlanTopics
-from quad_nav.ros.navigator.reconfigure import serve_namespaces
+from quad_nav.ros.navigator.reconfigure import ParameterServers
 from quad_nav.scenario.navigator_host import NavigatorHost
+from quad_nav.scenario.warm_up import warm_up
 from quad_nav.topics.publishing import Names, own_node
 
 
@@ -38,6 +40,7 @@ class RobotInterface:
         lock: Guards the navigator against services and reconfiguration, which run in rospy's
             threads.
         warnings: Logs the robot's warnings.
+        on_request: Called when a goal or another request has come.
         health: Meters of the navigator.
     """
 
@@ -54,6 +57,7 @@ class RobotInterface:
         self.name = f"quad{number}"
         self.lock = threading.RLock()
         self.warnings = ThrottledWarnings()
+        self.on_request: Callable[[], None] = lambda: None
         self._host, self._navigator = host, host.navigator
         self._publishers = {
             name: CostmapPublisher(f"{name}_costmap", costmap, self.lock, names)
@@ -62,19 +66,48 @@ class RobotInterface:
         global_frame, local_frame = (one.params.global_frame for one in host.costmaps)
         self._topics = PlanTopics(host.navigator, names)
         self._obstacles = ObstacleTopics(host.scan_filters, local_frame, names)
-        self._reconfigure = serve_namespaces(
-            self.name, host.configuration, self._on_reconfigure, names
-        )
+        self._names, self._changing = names, threading.Lock()
         self._services = PlanServices(host, self._topics, self.lock, locate, names)
-        self._goals = GoalServer(number, transforms, global_frame, names)
+        with self._changing:
+            self._parameters = ParameterServers(
+                self.name, host.configuration, self._on_reconfigure, names
+            )
+        self._goals = GoalServer(number, transforms, global_frame, names, lambda: self.on_request())
         self._maps = static_maps.connect(host.costmaps, self.lock, names)
         node = rospy.get_name() if names is own_node else names("~")
         self.health = NavigatorHealth(node.strip("/"), self.name, inputs)
 
     def _on_reconfigure(self, namespace: str, changes: Dict[str, Any]) -> config.Configuration:
-        with self.lock:
-            self._host.reconfigure(config.updated(self._host.configuration, namespace, changes))
-            return self._host.configuration
+        with self._changing:
+            before = self._host.configuration
+            stored = self._stored_planners(changes)
+            changed = config.updated(before, namespace, changes, stored)
+            if planners_of(changed) == planners_of(before):
+                with self.lock:
+                    self._host.reconfigure(changed)
+            else:
+                self._change_planners(changed)
+        self.on_request()
+        return changed
+
+    def _stored_planners(self, changes: Dict[str, Any]) -> Dict[str, Any]:
+        """Return the parameters of the planners among the changes, as the server has them."""
+        names = [plugin_name(changes[key]) for key in SLOTS if key in changes]
+        stored = {name: rospy.get_param(self._names(f"~{name}"), None) for name in names}
+        return {name: found for name, found in stored.items() if found is not None}
+
+    def _change_planners(self, configuration: config.Configuration) -> None:
+        """Fly on with other planners; their kernels are compiled before the robot stops."""
+        try:
+            warm_up(configuration)
+            with self.lock:
+                self._host.reconfigure(configuration)
+                self._topics.change_planners()
+        except PluginError as error:
+            raise InputError([str(error)]) from error
+        rospy.loginfo("%s: planners: %s", self.name, " and ".join(planners_of(configuration)))
+        self._services.change_planner()
+        self._parameters.change_planners(configuration)
 
     def poll(self, now_s: float) -> None:
         """Pass a waiting goal or cancel request to the navigator, if it accepts one now."""
@@ -98,7 +131,7 @@ class RobotInterface:
         self._navigator.cancel()
         self._goals.finish(Outcome(False, str(error)))
 
-    def publish(self, tick: Tick, in_global: Optional[Pose3D], located: RobotPoses) -> None:
+    def publish(self, tick: Tick, in_global: Optional[LocatedPose], located: RobotPoses) -> None:
         """Publish and log the results of a tick.
 
         Args:
@@ -110,9 +143,10 @@ class RobotInterface:
         self.health.update(tick, located, self._host.wall_s)
         self._log(tick)
         if in_global is not None:
-            self._topics.publish(tick, in_global)
             if tick.cycle:
-                self._goals.publish_feedback(in_global, time_message(tick.now_s))
+                stamp = time_message(in_global.stamp_s)
+                self._goals.publish_feedback(in_global.pose, stamp)
+            self._topics.publish(tick, *in_global)
         elif tick.command is not None:
             self._topics.stop()
         self._obstacles.publish(tick.now_s)
@@ -138,3 +172,9 @@ class RobotInterface:
                 tick.recovery.total,
                 tick.recovery.name,
             )
+
+
+def planners_of(configuration: config.Configuration) -> Tuple[str, str]:
+    """Return the names of a configuration's planners."""
+    params = configuration.navigator
+    return params.base_global_planner, params.base_local_planner

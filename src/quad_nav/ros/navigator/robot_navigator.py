@@ -7,18 +7,18 @@ publishes the results through the robot's interface.
 from __future__ import annotations
 
 import math
-from typing import List, Optional, Tuple
+from typing import Callable, List, Optional, Tuple
 
 import rospy
 from nav_msgs.msg import Odometry
 
 from quad_nav.config import Configuration
 from quad_nav.errors import PluginError
-from quad_nav.geometry import Pose3D, Twist2D
+from quad_nav.geometry import Twist2D
 from quad_nav.navigator.tick import RobotPoses
 from quad_nav.ros.common.conversions import odometry_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
-from quad_nav.ros.common.transforms import Transforms
+from quad_nav.ros.common.transforms import LocatedPose, Transforms
 from quad_nav.ros.navigator import sensors, static_maps
 from quad_nav.ros.navigator.health_meters import InputMeter
 from quad_nav.ros.navigator.peer_topics import PeerTopics
@@ -28,7 +28,7 @@ from quad_nav.timing import is_due
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.validation import odometry_problem
 
-POLL_S = 0.05  # delay after which an idle navigator notices a goal
+POLL_S = 0.05  # delay after which an idle navigator notices messages; a request wakes it
 FIRST_POSE_S = 0.5
 """Longest wait for the first pose; then the navigator runs, and says what is missing."""
 
@@ -40,6 +40,7 @@ class RobotNavigator(NavigatorHost):
         number: Number of the robot.
         name: Name of the robot, for messages.
         due_s: Time at which `step` is due.
+        has_request: Whether it is due now, for a goal or another request that has come.
         health: Meters of the navigator.
     """
 
@@ -53,10 +54,11 @@ class RobotNavigator(NavigatorHost):
         """Build the navigator and connect it; robots of a process share transforms and peers."""
         super().__init__(configuration)
         self.number, self.name = configuration.robot, f"quad{configuration.robot}"
-        self.due_s = 0.0
+        self.due_s, self.has_request = 0.0, False
         self._velocity = Twist2D()
         self._odometry_s: Optional[float] = None  # of the last message, at first of the first step
         self._start_s: Optional[float] = None  # when it starts at the latest, set by the first step
+        self._last_pose: Optional[LocatedPose] = None
         self._transforms, self._peers = transforms, peers
         self._warnings = ThrottledWarnings()
         self._odometry_meter = InputMeter(rospy.resolve_name(names("odom")))
@@ -76,8 +78,18 @@ class RobotNavigator(NavigatorHost):
         """Subscribers to the topics that the navigator needs."""
         return [self._odometry, *(sensor.subscriber for sensor in self._sensors)]
 
+    def on_request(self, wake: Callable[[], None]) -> None:
+        """Call a function when a goal or another request has come."""
+
+        def note() -> None:
+            self.has_request = True
+            wake()
+
+        self._interface.on_request = note
+
     def step(self, now_s: float) -> None:
         """Do the work that is due at a time; a plugin's mistake aborts the goal."""
+        self.has_request = False
         with self._interface.lock:
             try:
                 self._step(now_s)
@@ -129,6 +141,9 @@ class RobotNavigator(NavigatorHost):
             if poses:
                 costmap.set_map_poses(poses)
         in_global, located = self._locate(now_s)
+        if in_global is None and not navigator.stops_without_data:
+            in_global = self._last_pose  # as upstream, which publishes it
+        self._last_pose = in_global
         if self._start_s is None:
             self._start_s = now_s + FIRST_POSE_S
         if in_global is not None:
@@ -139,7 +154,7 @@ class RobotNavigator(NavigatorHost):
         tick = self.tick(now_s, located, self._velocity, peers)
         self._interface.publish(tick, in_global, located)
 
-    def _locate(self, now_s: float) -> Tuple[Optional[Pose3D], RobotPoses]:
+    def _locate(self, now_s: float) -> Tuple[Optional[LocatedPose], RobotPoses]:
         """Return the robot's pose in the global costmap's frame, and in those of both costmaps.
 
         Without odometry the velocity is unknown, so the poses count as unknown as well.
@@ -153,7 +168,8 @@ class RobotNavigator(NavigatorHost):
         ]
         in_global, in_local = self._transforms.locate_in(frames, now_s)
         return in_global, RobotPoses(
-            in_global.to_2d() if in_global else None, in_local.to_2d() if in_local else None
+            in_global.pose.to_2d() if in_global else None,
+            in_local.pose.to_2d() if in_local else None,
         )
 
     def _odometry_timeout(self, now_s: float) -> str:
