@@ -154,6 +154,7 @@ def test_messages_that_are_dropped(ros):
 
 def test_the_newest_message_of_each_node_counts(ros):
     peers = host()
+    assert peers.near(0, None, 0.0) == []
     for x_m, robots, sender in ((1.0, [2], "/simulator"), (5.0, [3], "/vehicles"), (4.0, [2], "")):
         deliver(STATES_TOPIC, states_message(states(robots, x_m)), sender or "/simulator")
     assert peers.near(0, None, 0.0) == []  # until the next refresh
@@ -193,6 +194,7 @@ def test_a_standing_clock_is_no_missing_robot(ros, wall):
     peers = host()
     deliver(STATES_TOPIC, states_message(states(range(ROBOTS))))
     peers.refresh(1.0)
+    assert len(peers.near(0, None, 0.0)) == 3
     wall.now_s += 60.0
     joined(peers._topics)
     assert odometry_topics() == []

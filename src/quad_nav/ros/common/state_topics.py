@@ -82,11 +82,16 @@ class OwnTopics:
         )
         return silent_s > MISSING_AFTER_S
 
+    @property
+    def is_due(self) -> bool:
+        """Whether the next `check` does anything."""
+        return time.monotonic() >= self._next_check_s
+
     def check(self) -> None:
         """Subscribe and unsubscribe as needed, in another thread; call it often."""
-        now_s = time.monotonic()
-        if now_s < self._next_check_s:
+        if not self.is_due:
             return
+        now_s = time.monotonic()
         self._next_check_s = now_s + (FIND_S if self._find else CHECK_S)
         missing = self._missing()
         steady = ~missing & (now_s - self._since_s > STEADY_S)
@@ -138,7 +143,7 @@ class StateTopics:
             on_odometry: Called with a robot and its odometry message, which is not checked.
             subscribed: Called with a robot and the subscriber to its odometry, in another thread.
             queue_size: Length of the subscribers' queues. With 0 only the newest message of each
-                node counts, and `check` reads it.
+                node counts, and waits for `read`.
             topic: Returns the name of the topic of a robot's odometry.
             only_published: Whether it is not known which robots there are: see `OwnTopics`.
         """
@@ -159,13 +164,15 @@ class StateTopics:
         )
 
     def check(self) -> None:
-        """Read the messages that wait; hear from their odometry robots that none carries.
+        """Hear robots that are not in the state messages from their odometry; call it often."""
+        if self._own.is_due:
+            self.read()
+        self._own.check()
 
-        Call it often.
-        """
+    def read(self) -> None:
+        """Read the messages that wait."""
         while self._waiting:
             self._on_message(self._waiting.popitem()[1])
-        self._own.check()
 
     def _store(self, message: StatesMessage) -> None:
         self._waiting[sender_of(message)] = message
