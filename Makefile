@@ -9,7 +9,7 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance replay-vehicles fly-vehicles replay-airframe fuzz bench bench-compare bench-fleets debian12 debian13 packages flight-venv venv workspace clean distclean
+.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance replay-vehicles fly-vehicles replay-airframe fuzz bench bench-compare bench-fleets bench-original debian12 debian13 packages flight-venv venv workspace clean distclean
 
 help:  ## List the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -109,6 +109,9 @@ bench-compare: venv  ## What got slower between two runs: make bench-compare A=b
 
 bench-fleets: venv  ## Whether fleets get through without touching: make bench-fleets ARGS="swap 8in12"
 	PYTHONPATH=src $(PYTHON) bench/encounters.py $(ARGS)
+
+bench-original: workspace  ## What a navigator costs under ROS beside C++ move_base: make bench-original ARGS="--config default"
+	@scripts/ros_env $(PYTHON) bench/original.py $(ARGS)
 
 debian12:  ## Fly on a bare Debian 12 in a chroot; needs root, 3 GB and minutes
 	@scripts/debian bookworm $(TESTS)

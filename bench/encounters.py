@@ -15,7 +15,7 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import dataclass, replace
-from typing import Any, List, Sequence, Tuple
+from typing import Any, Dict, List, Sequence, Tuple
 
 import click
 import tabulate
@@ -98,31 +98,16 @@ class EncounterResult:
 
 def options_of(encounter: str, seed: int, config: str) -> FlightOptions:
     """Options of the flight with this name."""
+    both: Dict[str, Any] = {"seed": seed, "time_limit_s": TIME_LIMIT_S}
     random = RANDOM.fullmatch(encounter)
     if random:
-        return FlightOptions(
-            None,
-            None,
-            config,
-            robots=int(random[1]),
-            size_m=float(random[2]),
-            seed=seed,
-            time_limit_s=TIME_LIMIT_S,
-        )
-    scene, goals = "arena.yaml", ""
-    if encounter != "mission":
-        scene, goals = (
-            f"encounters/{LOOPS.get(encounter, encounter)}.yaml",
-            f"encounters/{encounter}",
-        )
-    return FlightOptions(
-        shipped("scenes", scene),
-        shipped("goals", goals),
-        config,
-        seed=seed,
-        time_limit_s=TIME_LIMIT_S,
-        simulation=SimulationParams(jitter_m=JITTER_M),
-    )
+        robots, size_m = int(random[1]), float(random[2])
+        return FlightOptions(None, None, config, robots=robots, size_m=size_m, **both)
+    both["simulation"] = SimulationParams(jitter_m=JITTER_M)
+    if encounter == "mission":
+        return FlightOptions(shipped("scenes", "arena.yaml"), shipped("goals"), config, **both)
+    scene = shipped("scenes", f"encounters/{LOOPS.get(encounter, encounter)}.yaml")
+    return FlightOptions(scene, shipped("goals", f"encounters/{encounter}"), config, **both)
 
 
 def setup_of(task: Task) -> FlightSetup:
@@ -163,18 +148,18 @@ def figures(encounter: str, setup: FlightSetup, summary: MissionSummary) -> Enco
 
 
 def row(encounter: str, flights: Sequence[EncounterResult]) -> List[str]:
-    times = [one.time_s for one in flights]
-    reached, goals = sum(sum(one.reached) for one in flights), sum(one.goals for one in flights)
+    times_s, goals = [one.time_s for one in flights], sum(one.goals for one in flights)
+    reached = [one.reached for one in flights]
     return [
         encounter,
         str(len(flights)),
         str(sum(not one.faults for one in flights)),
-        f"{100 * reached / goals:.1f} %",
-        f"{min(min(one.reached) for one in flights)} : {max(max(one.reached) for one in flights)}",
+        f"{100 * sum(map(sum, reached)) / goals:.1f} %",
+        f"{min(map(min, reached))} : {max(map(max, reached))}",
         str(sum(bool(one.contacts) for one in flights)),
         f"{min(one.gap_m for one in flights):.2f}",
-        f"{sum(times) / len(times):.1f}",
-        f"{max(times):.1f}",
+        f"{sum(times_s) / len(times_s):.1f}",
+        f"{max(times_s):.1f}",
     ]
 
 

@@ -55,21 +55,29 @@ class Snapshot(NamedTuple):
 
 def measure(robots: int, given: argparse.Namespace) -> None:
     """Measure one size, print its line and add its figures to the file."""
-    port, hosts = free_port(), [f"hosts:={given.hosts}"] if given.hosts else []
-    launch = launch_fleet(port, robots, *hosts, *given.arguments)
+    hosts = [f"hosts:={given.hosts}"] if given.hosts else []
+    arguments = f"robots:={robots}", *hosts, *given.arguments
+    seen = snapshots(robots, given.seconds, "fleet.launch", *arguments)
+    show(robots, seen[0], seen[-1])
+    write(robots, seen, given.json)
+
+
+def snapshots(robots: int, seconds: float, *arguments: str) -> List[Snapshot]:
+    """Start a launch file of ours; return what its nodes have used at the ends of equal parts."""
+    port = free_port()
+    launch = start(port, *arguments)
     try:
         clock = Clock(time.monotonic() + TIMEOUT_S)
         clock.wait_until(1.0 + SETTLE_S)
         commands = Commands(min(robots, SAMPLED))
         begin_s, seen = clock.now_s, []
         for part in range(PARTS + 1):
-            clock.wait_until(begin_s + given.seconds * part / PARTS)
+            clock.wait_until(begin_s + seconds * part / PARTS)
             seen.append(Snapshot(clock.now_s, time.monotonic(), commands.count, used(port)))
     finally:
         launch.send_signal(signal.SIGINT)
         launch.wait()
-    show(robots, seen[0], seen[-1])
-    write(robots, seen, given.json)
+    return seen
 
 
 def cpu_of(before: Snapshot, after: Snapshot) -> Dict[str, float]:
@@ -122,20 +130,11 @@ def write(robots: int, seen: List[Snapshot], file: Optional[Path]) -> None:
     figures.write(file)
 
 
-def launch_fleet(port: int, robots: int, *arguments: str) -> subprocess.Popen[bytes]:
-    """Start ``fleet.launch`` under a roscore on this port."""
+def start(port: int, *arguments: str) -> subprocess.Popen[bytes]:
+    """Start a launch file of ours under a roscore on this port."""
     os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
     return subprocess.Popen(
-        [
-            "roslaunch",
-            "-p",
-            str(port),
-            "quad",
-            "fleet.launch",
-            f"robots:={robots}",
-            "rviz:=false",
-            *arguments,
-        ],
+        ["roslaunch", "-p", str(port), "quad", *arguments, "rviz:=false"],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,

@@ -26,7 +26,7 @@ import sys
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import click
 import numpy as np
@@ -64,8 +64,7 @@ class Task:
     time_limit_s: float
 
 
-@dataclass(frozen=True)
-class WalkersResult:
+class WalkersResult(NamedTuple):
     """Contacts of one flight, and those with people at which the quadcopter did something.
 
     ``person_mps`` are the people's speeds towards the quadcopter at the contacts.
@@ -73,7 +72,6 @@ class WalkersResult:
 
     name: str
     seed: int
-    contacts: int
     moved: int
     pushed: int
     moved_into: int
@@ -164,15 +162,15 @@ def fly_task(task: Task) -> WalkersResult:
     touches = Touches()
     summary = fly(setup_of(task), (touches,))
     legs = [leg for robot in summary.robots for leg in robot.legs]
+    speeds_mps = touches.speeds_mps
     return WalkersResult(
         task.name,
         task.seed,
-        len(touches.speeds_mps),
-        sum(speed_mps > MOVED_MPS for _, _, speed_mps in touches.speeds_mps),
+        sum(speed_mps > MOVED_MPS for _, _, speed_mps in speeds_mps),
         touches.pushed,
-        sum(towards_mps > MOVED_MPS for towards_mps, _, _ in touches.speeds_mps),
+        sum(towards_mps > MOVED_MPS for towards_mps, _, _ in speeds_mps),
         touches.others,
-        tuple(person_mps for _, person_mps, _ in touches.speeds_mps),
+        tuple(person_mps for _, person_mps, _ in speeds_mps),
         sum(leg.reached for leg in legs),
         len(legs),
         summary.sim_time_s,
@@ -180,19 +178,13 @@ def fly_task(task: Task) -> WalkersResult:
 
 
 def row(name: str, flights: Sequence[WalkersResult]) -> List[str]:
-    persons = [speed_mps for one in flights for speed_mps in one.person_mps]
-    return [
-        name,
-        str(len(flights)),
-        str(sum(one.contacts for one in flights)),
-        str(sum(one.moved for one in flights)),
-        str(sum(one.pushed for one in flights)),
-        str(sum(one.moved_into for one in flights)),
-        f"{np.mean(persons):.2f}" if persons else "",
-        str(sum(one.others for one in flights)),
-        f"{sum(one.reached for one in flights)} of {sum(one.goals for one in flights)}",
-        f"{np.mean([one.time_s for one in flights]):.0f}",
-    ]
+    _, _, *counts, persons, reached, goals, times_s = zip(*flights)
+    persons_mps = sum(persons, ())
+    moved, pushed, moved_into, others = map(sum, counts)
+    mean = f"{np.mean(persons_mps):.2f}" if persons_mps else ""
+    of = f"{sum(reached)} of {sum(goals)}"
+    cells = len(flights), len(persons_mps), moved, pushed, moved_into, mean, others, of
+    return [name, *map(str, cells), f"{np.mean(times_s):.0f}"]
 
 
 @click.command()
@@ -217,18 +209,15 @@ def main(
     jobs: int,
 ) -> None:
     """Fly among people and print a table of the results."""
-    names, given = (
-        names or ("2in12", "8in12", "2hallway", "8hallway"),
-        tuple(map(parameter, parameters)),
-    )
+    names = names or ("2in12", "8in12", "2hallway", "8hallway")
+    given = tuple(map(parameter, parameters))
     tasks = [
-        (k, Task(name, seed, config, given, people, reacting, time_limit))
-        for k, (name, seed) in enumerate(
-            (name, seed) for name in names for seed in range(first_seed, first_seed + seeds)
-        )
+        Task(name, seed, config, given, people, reacting, time_limit)
+        for name in names
+        for seed in range(first_seed, first_seed + seeds)
     ]
     flights: List[WalkersResult] = []
-    for _, one in fly_all(LocalWorkers(jobs), fly_task, tasks):
+    for _, one in fly_all(LocalWorkers(jobs), fly_task, list(enumerate(tasks))):
         flights.append(one)
         print(one, file=sys.stderr, flush=True)
     rows = [row(name, [one for one in flights if one.name == name]) for name in names]

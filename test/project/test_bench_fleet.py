@@ -1,15 +1,17 @@
-"""What ``bench/fleet.py`` makes of two moments of a fleet's flight."""
+"""What ``bench/fleet.py`` and ``bench/original.py`` make of two moments of a flight."""
 
 import json
 import sys
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 BENCH = Path(__file__).resolve().parents[2] / "bench"
 sys.path.insert(0, str(BENCH))
 
 import fleet  # noqa: E402
+import original  # noqa: E402
 from fleet import Snapshot  # noqa: E402
 
 
@@ -49,3 +51,19 @@ def test_the_line_and_the_file_have_the_cost_of_a_robot(tmp_path, capsys):
         "memory of all nodes",
     ]
     assert written[3]["values"] == [92.0]
+
+
+@pytest.mark.parametrize(("wall_s", "marked"), [(10.5, "0.95"), (10.6, "0.94 too slow")])
+def test_a_run_on_a_busy_machine_is_marked(wall_s, marked):
+    def used(cpu_s):
+        return {"move_base0": (cpu_s, 70.0), "move_base1": (3 * cpu_s, 80.0), "simulator": (9, 9)}
+
+    seen = [Snapshot(6.0, 0.0, 0, used(1.0)), Snapshot(16.0, wall_s, 20, used(1.2))]
+    assert original.row("quad", seen) == ["quad", "40.0", "75", "1.0", marked]
+
+
+def test_a_configuration_that_is_not_there_is_refused_before_anything_starts(monkeypatch):
+    monkeypatch.setattr(original, "snapshots", None)
+    result = CliRunner().invoke(original.main, ["--config", "nosuch"])
+    assert result.exit_code == 2
+    assert "nosuch" in result.output

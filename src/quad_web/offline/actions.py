@@ -9,6 +9,7 @@ import numpy as np
 
 from quad_nav import config
 from quad_nav.config import Configuration
+from quad_nav.config.files import below
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.goal import MAX_COORDINATE_M
@@ -48,7 +49,6 @@ class FlightActions(GoalEditing):
         self.lidars: List[bool] = []
         self._flight: Optional[Flight] = None
         self._has_ended = False
-        self._loaded: List[Configuration] = []
 
     @property
     def state(self) -> str:
@@ -71,7 +71,6 @@ class FlightActions(GoalEditing):
         self.is_paused, self._has_ended, self.stop_reason = False, False, ""
         self.done = []
         self.lidars = [True] * len(flight.robots)
-        self._loaded = [robot.configuration for robot in flight.robots]
         paths = {robot: goals.file.path for robot, goals in enumerate(setup.robots)}
         self._files = GoalFiles(
             {robot: path for robot, path in paths.items() if path.is_file()},
@@ -171,7 +170,7 @@ class FlightActions(GoalEditing):
     def parameters(self, robot: int) -> Sequence[ParameterView]:
         """Return the parameters of a robot's navigator that can be changed in flight."""
         self._name(robot)
-        return parameter_views(self.flight.robots[robot].configuration, self._loaded[robot])
+        return parameter_views(self.flight.robots[robot].configuration)
 
     def set_parameters(self, robot: int, namespace: str, values: Mapping[str, Any]) -> Answer:
         """Change parameters of one namespace."""
@@ -205,12 +204,12 @@ class FlightActions(GoalEditing):
         return Answer(True, line)
 
 
-def parameter_views(configuration: Configuration, loaded: Configuration) -> List[ParameterView]:
-    """Return the parameters that can change, of the configurations in force and of the files."""
+def parameter_views(configuration: Configuration) -> List[ParameterView]:
+    """Return the parameters that can change, with the values in force and those of the files."""
     views: List[ParameterView] = []
     for namespace, parameters in config.reconfigurable(configuration).items():
         values = config.values(configuration, namespace)
-        start = config.values(loaded, namespace)
+        start = below(configuration.tree_at_start, namespace)
         views += [
             ParameterView(
                 namespace,

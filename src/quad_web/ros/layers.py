@@ -14,6 +14,7 @@ from quad.msg import MovingObstacles
 from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan
 
+from quad_nav.config.planners import SLOTS
 from quad_nav.config.plugins import plugin_name
 from quad_nav.grid import GridSpec
 from quad_nav.ros.common.conversions import ScanMessage, scan_from_message
@@ -41,11 +42,11 @@ class MessageIntake:
     """
 
     def __init__(
-        self, topic: str, message_type: Any, make: Callable[[bytes], Optional[Item]]
+        self, message_type: Any, make: Callable[[bytes], Optional[Item]], *topics: str
     ) -> None:
         """Make an item of a message's bytes; ``make`` raises `ValueError` for a faulty one."""
-        self._newest, self._make = Newest(topic, message_type), make
-        self.topics = {topic: self._newest.topic}
+        self._newest, self._make = Newest(topics[0], message_type), make
+        self.topics = dict.fromkeys(topics, self._newest.topic)
 
     def item(self) -> Optional[Item]:
         """Return the item if it is new."""
@@ -142,16 +143,18 @@ class Layers:
         if layer in OF_ONE_ROBOT:
             return CostmapIntake(layer, robot, self._frames)
         if layer == "scan":
-            return MessageIntake(f"/scan{robot}", LaserScan, partial(self._scan, robot))
+            return MessageIntake(LaserScan, partial(self._scan, robot), f"/scan{robot}")
         node = f"/move_base{robot}"
         if layer == "track":
             make = partial(self._track, robot)
-            return MessageIntake(f"{node}/{TRACKS_TOPIC}", MovingObstacles, make)
+            return MessageIntake(MovingObstacles, make, f"{node}/{TRACKS_TOPIC}")
         planner = self._tree_of(robot).get(_PLANNERS[layer])
         if not isinstance(planner, str):
             return None
         make = partial(self._plan, layer, robot)
-        return MessageIntake(f"{node}/{plugin_name(planner)}/{layer}", Path, make)
+        planners = (planner, *SLOTS[_PLANNERS[layer]].types)  # one may take the place of another
+        names = dict.fromkeys(f"{node}/{plugin_name(one)}/{layer}" for one in planners)
+        return MessageIntake(Path, make, *names)
 
     def _scan(self, robot: int, data: bytes) -> Optional[Item]:
         """Return a scan's hit points where the robot was at its time."""

@@ -88,3 +88,21 @@ def test_the_validator_follows_a_longer_time_out():
         assert "expected less than 1.00 s" in intake.add_scan(scan, poses, 1.5, 1.5)
         flight.reconfigure(0, {"sensor_timeout": 2.0})
         assert intake.add_scan(scan, poses, 1.5, 1.5) == ""
+
+
+@pytest.mark.parametrize(
+    "name", ["dwa_local_planner/DWAPlannerROS", "global_planner/GlobalPlanner"]
+)
+def test_a_planner_changes_on_the_way(name):
+    """The robot stops for a moment, and the other planner takes it to its goal."""
+    key = "base_local_planner" if "local" in name else "base_global_planner"
+    with quad_nav.Flight(setup_of(robots=1)) as flight:
+        while flight.now_s < 5.0:
+            flight.step()
+        assert flight.state(0).twist.vx_mps > 0.1
+        changed = flight.reconfigure(0, {key: name})
+        assert getattr(changed.navigator, key) == name
+        while not flight.has_ended(0) and flight.now_s < 60.0:
+            flight.step()
+        assert np.hypot(*(flight.positions_m[0, :2] - GOALS[0][-1])) < 0.5
+        assert not flight.contacts

@@ -52,10 +52,11 @@ def wall(monkeypatch):
     return wall
 
 
-def joined(own_topics):
-    own_topics.check()
-    if own_topics._worker.ident is not None:
-        own_topics._worker.join()
+def joined(topics):
+    topics.check()
+    worker = getattr(topics, "_own", topics)._worker
+    if worker.ident is not None:
+        worker.join()
 
 
 def host(own=(0, 1), frame="map"):
@@ -144,19 +145,30 @@ def test_messages_that_are_dropped(ros):
         states([]),
     ):
         deliver(STATES_TOPIC, states_message(message))
+        peers.refresh(1.0)
+        assert peers.near(0, None, 0.0) == []
     deliver(STATES_TOPIC, states_message(states([2])), "/fleet0")  # of this node
     peers.refresh(1.0)
     assert peers.near(0, None, 0.0) == []
 
 
+def test_the_newest_message_of_each_node_counts(ros):
+    peers = host()
+    assert peers.near(0, None, 0.0) == []
+    for x_m, robots, sender in ((1.0, [2], "/simulator"), (5.0, [3], "/vehicles"), (4.0, [2], "")):
+        deliver(STATES_TOPIC, states_message(states(robots, x_m)), sender or "/simulator")
+    assert peers.near(0, None, 0.0) == []  # until the next refresh
+    peers.refresh(1.0)
+    assert [(p.name, p.x_m) for p in peers.near(0, None, 0.0)] == [("quad2", 6.0), ("quad3", 8.0)]
+
+
 def test_a_robot_that_no_message_carries_is_heard_from_its_odometry(ros, wall):
     peers = host()
-    own_topics = peers._topics._own
     for step in range(8):
         wall.now_s += 0.1
         ros.set_time(1.0 + 0.1 * step)
         deliver(STATES_TOPIC, states_message(states([0, 1, 3])))
-        joined(own_topics)
+        joined(peers._topics)
     assert odometry_topics() == ["/odom2"]
     deliver("/odom2", odometry(2, 7.0))
     peers.refresh(1.7)
@@ -170,9 +182,9 @@ def test_a_robot_that_no_message_carries_is_heard_from_its_odometry(ros, wall):
         wall.now_s += 0.1
         ros.set_time(2.0 + 0.1 * step)
         deliver(STATES_TOPIC, states_message(states([0, 1, 2, 3])))
+        joined(peers._topics)
         if odometry_topics():
             deliver("/odom2", odometry(2, 99.0))
-        joined(own_topics)
         peers.refresh(2.0)
         assert [p.x_m for p in peers.near(0, None, 0.0)] == [1.0, 2.0, 3.0]
     assert odometry_topics() == []
@@ -181,12 +193,14 @@ def test_a_robot_that_no_message_carries_is_heard_from_its_odometry(ros, wall):
 def test_a_standing_clock_is_no_missing_robot(ros, wall):
     peers = host()
     deliver(STATES_TOPIC, states_message(states(range(ROBOTS))))
+    peers.refresh(1.0)
+    assert len(peers.near(0, None, 0.0)) == 3
     wall.now_s += 60.0
-    joined(peers._topics._own)
+    joined(peers._topics)
     assert odometry_topics() == []
     ros.set_time(2.0)
     wall.now_s += 0.2
-    joined(peers._topics._own)
+    joined(peers._topics)
     assert odometry_topics() == [f"/odom{k}" for k in range(ROBOTS)]
 
 
@@ -194,7 +208,7 @@ def test_own_robots_that_come_from_odometry_are_published_in_one_message(ros, wa
     monkeypatch.setattr(FakePublisher, "get_num_connections", lambda _: 2)
     peers = host()
     wall.now_s += 1.0
-    joined(peers._topics._own)
+    joined(peers._topics)
     for k in range(ROBOTS):
         deliver(f"/odom{k}", odometry(k, 0.25 * k))
     peers.refresh(1.0)
@@ -215,7 +229,7 @@ def test_peers_that_nobody_has_counted_are_those_that_publish(ros, wall, monkeyp
         (["/odom", "/odom3"], ["/odom", "/odom2", "/odom3"]),
     ):
         wall.now_s += 1.0
-        joined(peers._topics._own)
+        joined(peers._topics)
         assert odometry_topics() == heard
     deliver(STATES_TOPIC, states_message(states([0, 1])))
     deliver("/odom3", odometry(3, 7.0))

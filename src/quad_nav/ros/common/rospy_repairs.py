@@ -4,7 +4,8 @@
   drops is a warning in the publisher's log: "Inbound TCP/IP connection failed".
 * It lets five connections wait. Linux drops further ones, and their nodes try again after 1 s:
   until then a navigator that has just started does not hear the clock.
-* It takes the time from every publisher of `/clock`: with two the time jumps to and fro.
+* It takes the time from every publisher of `/clock`: with two the time jumps to and fro. It tells
+  sleeping threads by a name that Python 3.10 has deprecated, and each call makes a warning.
 * It registers once. A ROS master that is started again does not know the node: nobody finds its
   services, and new nodes do not connect to its topics. Those that are connected stay so.
 * Each log call reads a parameter, and asks the master for it as long as it is not set.
@@ -221,8 +222,12 @@ class Alarm:
 
 def set_time(now: rospy.Time) -> None:
     """Set the time of this node, unless it has the time of the system."""
-    if not rospy.rostime.is_wallclock():
-        rospy.rostime._set_rostime(now)
+    if rospy.rostime.is_wallclock():
+        return
+    condition = rospy.rostime.get_rostime_cond()
+    with condition:
+        rospy.rostime._rostime_current = rospy.Time(now.secs, now.nsecs)
+        condition.notify_all()
 
 
 def hear_one_clock(hears_clock: bool) -> None:

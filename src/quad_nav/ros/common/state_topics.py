@@ -82,11 +82,16 @@ class OwnTopics:
         )
         return silent_s > MISSING_AFTER_S
 
+    @property
+    def is_due(self) -> bool:
+        """Whether the next `check` does anything."""
+        return time.monotonic() >= self._next_check_s
+
     def check(self) -> None:
         """Subscribe and unsubscribe as needed, in another thread; call it often."""
-        now_s = time.monotonic()
-        if now_s < self._next_check_s:
+        if not self.is_due:
             return
+        now_s = time.monotonic()
         self._next_check_s = now_s + (FIND_S if self._find else CHECK_S)
         missing = self._missing()
         steady = ~missing & (now_s - self._since_s > STEADY_S)
@@ -126,7 +131,7 @@ class StateTopics:
         on_states: Callable[[States], bool],
         on_odometry: Callable[[int, Odometry], None],
         subscribed: Callable[[int, rospy.Subscriber], None] = lambda *_: None,
-        queue_size: int = 1,
+        queue_size: int = 0,
         topic: Callable[[int], str] = "/odom{}".format,
         only_published: bool = False,
     ) -> None:
@@ -137,24 +142,40 @@ class StateTopics:
             on_states: Called with the valid states of a message; returns whether it can use them.
             on_odometry: Called with a robot and its odometry message, which is not checked.
             subscribed: Called with a robot and the subscriber to its odometry, in another thread.
-            queue_size: Length of the subscribers' queues.
+            queue_size: Length of the subscribers' queues. With 0 only the newest message of each
+                node counts, and waits for `read`.
             topic: Returns the name of the topic of a robot's odometry.
             only_published: Whether it is not known which robots there are: see `OwnTopics`.
         """
         self._robots, self._on_states, self._on_odometry = robots, on_states, on_odometry
-        self._subscribed, self._queue_size = subscribed, queue_size
+        self._subscribed, self._queue_size = subscribed, queue_size or 1
+        self._waiting: Dict[str, StatesMessage] = {}  # by the node
         self._reader, self._warnings = StatesReader(), ThrottledWarnings()
         self._topic = topic
         self._own = OwnTopics(
             robots, range(robots), self._subscribe, topic if only_published else None
         )
         self.subscriber = rospy.Subscriber(
-            STATES_TOPIC, StatesMessage, self._on_message, queue_size=queue_size, tcp_nodelay=True
+            STATES_TOPIC,
+            StatesMessage,
+            self._on_message if queue_size else self._store,
+            queue_size=self._queue_size,
+            tcp_nodelay=True,
         )
 
     def check(self) -> None:
         """Hear robots that are not in the state messages from their odometry; call it often."""
+        if self._own.is_due:
+            self.read()
         self._own.check()
+
+    def read(self) -> None:
+        """Read the messages that wait."""
+        while self._waiting:
+            self._on_message(self._waiting.popitem()[1])
+
+    def _store(self, message: StatesMessage) -> None:
+        self._waiting[sender_of(message)] = message
 
     def _subscribe(self, robot: int) -> rospy.Subscriber:
         subscriber = rospy.Subscriber(

@@ -64,7 +64,8 @@ class PeerTopics:
         self._odometry: Dict[int, Odometry] = {}
         self._states = np.full((robots, 5), np.nan)  # x, y, vx, vy in the frame, and the stamp
         self._peers: Dict[int, Peer] = {}  # of the last refresh, those that were asked for
-        self._snapshot, self._now_s = self._states.copy(), 0.0
+        self._snapshot: Optional[Floats] = None  # of the states, since the last refresh
+        self._now_s = 0.0
         self._topic_watch, self._warnings = TopicWatch(), ThrottledWarnings()
         # Alone there is no peer to hear, and none that listens.
         self._topics = self._subscribe(robots, own) if robots > 1 else None
@@ -127,19 +128,24 @@ class PeerTopics:
         self._states[states.robots] = rows
 
     def refresh(self, now_s: float) -> None:
-        """Update the peers from the messages that have arrived, and publish what is due."""
+        """Let `near` update the peers from what has arrived, and publish what is due."""
         if self._topics is not None:
             self._topics.check()
             self._topic_watch.check()
         self._take_odometry()
-        self._now_s, self._snapshot = now_s, self._states.copy()
-        if self._finds:
-            self._log_found()
+        self._now_s, self._snapshot = now_s, None
         self._peers.clear()
         self._host_publisher.publish(self._own_intentions, now_s)
 
+    def _take_snapshot(self) -> Floats:
+        if self._topics is not None:
+            self._topics.read()
+        if self._finds:
+            self._log_found()
+        return self._states.copy()
+
     def _log_found(self) -> None:
-        known = set(np.flatnonzero(~np.isnan(self._snapshot[:, 0])).tolist())
+        known = set(np.flatnonzero(~np.isnan(self._states[:, 0])).tolist())
         for robot in sorted(known - self._own - self._found):
             self._found.add(robot)
             rospy.loginfo("quad%d: found quad%d, avoiding it", min(self._own), robot)
@@ -171,17 +177,21 @@ class PeerTopics:
             here: Pose of the robot; None returns all peers.
             reach_m: Peers beyond this distance may be left out.
         """
-        x_m, y_m = self._snapshot[:, 0], self._snapshot[:, 1]
+        if self._snapshot is None:
+            self._snapshot = self._take_snapshot()
+        states = self._snapshot
+        x_m, y_m = states[:, 0], states[:, 1]
         if here is None:
             is_near: NDArray[np.bool_] = ~np.isnan(x_m)
         else:
             is_near = (np.abs(x_m - here.x_m) < reach_m) & (np.abs(y_m - here.y_m) < reach_m)
-        return [self._peer(other) for other in np.flatnonzero(is_near).tolist() if other != number]
+        others = [other for other in np.flatnonzero(is_near).tolist() if other != number]
+        return [self._peer(other, states[other]) for other in others]
 
-    def _peer(self, number: int) -> Peer:
+    def _peer(self, number: int, state: Floats) -> Peer:
         peer = self._peers.get(number)
         if peer is None:
-            peer = Peer(f"quad{number}", *self._snapshot[number].tolist())
+            peer = Peer(f"quad{number}", *state.tolist())
             peer = peer.with_intention(self._intentions.of(number, peer, self._now_s))
             self._peers[number] = peer
         return peer

@@ -55,7 +55,6 @@ from quad_nav.sim.pacing import Pacer, RateMeter
 from quad_nav.sim.simulation_params import FASTEST_RATE, STEP_S, STEPS_PER_S
 from quad_nav.topics.validation import MAX_MAGNITUDE
 
-_STEPS_PER_CLOCK = STEPS_PER_S // 120
 _START_STEP = STEPS_PER_S
 _HEALTH_PERIOD_S = 1.0  # wall time, as the next two
 _PAUSED_PERIOD_S = 0.5
@@ -83,7 +82,6 @@ class SimulatorNode:
         self._topics = SimulatorTopics(self._simulation, setup.map_resolution_m, others)
         self._commands = Commands(self._simulation)
         self._meter = RateMeter()
-        self._is_all_hosted = not others
         self._set_rate(setup.rate)
         self._paused, self._stopping = True, False
         self._next_health_s = self._next_republish_s = 0.0
@@ -186,9 +184,6 @@ class SimulatorNode:
         self._rate = rate
         self._pacer = Pacer(rate, STEP_S)
         self._pacer.start(time.monotonic())
-        # Often enough faster than real time, and for navigators that do not hear the clock.
-        with_odometry = rate > 1.0 or self._is_all_hosted
-        self._steps_per_clock = STEPS_PER_ODOMETRY if with_odometry else _STEPS_PER_CLOCK
         return f"the rate is {rate:g}"
 
     def _pause(self) -> str:
@@ -219,8 +214,8 @@ class SimulatorNode:
         time.sleep(min(wait_s, _MAX_SLEEP_S))
 
     def _steps_to_clock(self) -> int:
-        """Return the number of steps until the clock is published."""
-        return self._steps_per_clock - self._simulation.step_count % self._steps_per_clock
+        """Return the number of steps until clock, poses and states are published."""
+        return STEPS_PER_ODOMETRY - self._simulation.step_count % STEPS_PER_ODOMETRY
 
     def _step(self, steps: int) -> None:
         """Do at most so many steps, up to the next scan or odometry, and publish."""
@@ -228,9 +223,8 @@ class SimulatorNode:
         for contact in progress.contacts:
             self._topics.publish_contact(contact)
         count = self._simulation.step_count
-        if count % self._steps_per_clock == 0:
-            self._publish_clock()
         if progress.is_odometry:
+            self._publish_clock()
             self._topics.publish_poses()
         if count % self._setup.steps_per_scan == 0:
             self._topics.publish_scans()
