@@ -16,6 +16,7 @@ A step has `family`, `input` and, if it was recorded, `expected` or `cpp`, the a
 move_base; what that does not have is not compared:
 
     service   {service: make_plan, start: [x, y, yaw, frame], goal: likewise, tolerance: metres}
+    action    a goal or a cancel as in recordings, see transcript_action
     goal      [x, y, yaw, frame]; the next step comes when the goal is active
     cancel    seconds to wait after a cancel of all goals
     wait      seconds of simulated time
@@ -41,6 +42,7 @@ import yaml
 _HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(_HERE)]
 
+import transcript_action  # noqa: E402
 import transcript_service  # noqa: E402
 from transcript_session import NotStarted, Session  # noqa: E402
 
@@ -49,6 +51,7 @@ Answer = Callable[[Session, Any], Any]
 
 FAMILIES: Dict[str, Answer] = {
     "service": transcript_service.answer,
+    "action": transcript_action.answer,
     "goal": lambda session, place: session.send_goal(place),
     "cancel": lambda session, seconds: session.cancel(seconds),
     "wait": lambda session, seconds: session.wait(seconds),
@@ -96,6 +99,14 @@ def recorded_answer(step: Dict[str, Any]) -> Any:
     return step.get("expected", step.get("cpp"))
 
 
+def is_as_recorded(step: Dict[str, Any]) -> bool:
+    """Whether the answer to a step is that of C++ move_base."""
+    answer, recorded = step["answer"], recorded_answer(step)
+    if step["family"] == "action":
+        return transcript_action.is_equal(step["input"], answer, recorded)
+    return is_equal(answer, recorded)
+
+
 def is_equal(answer: Any, recorded: Any) -> bool:
     """Whether an answer is as recorded, in all that is recorded of it."""
     if isinstance(recorded, dict):
@@ -122,7 +133,7 @@ def main() -> int:
             print(f"{path}: {error}", file=sys.stderr)
             return EXIT_UNUSABLE
         recorded = [step for step in transcript if recorded_answer(step) is not None]
-        wrong = [s for s in recorded if not is_equal(s["answer"], recorded_answer(s))]
+        wrong = [step for step in recorded if not is_as_recorded(step)]
         print(f"{path.stem}: {len(recorded) - len(wrong)} of {len(recorded)} answers are equal")
         for step in wrong:
             print(f"  differs: {json.dumps(step['input'])}")
