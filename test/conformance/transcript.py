@@ -9,8 +9,8 @@ FILE is a session, by default each one in transcripts/. It is YAML:
     world:    robot and surroundings, see transcript_world.World
     params:   the node's private parameters, those of costmaps and planners below their names
     steps:    inputs in their order
-    recorded: {file: FILE, config: NAME}, further steps: those of a list in JSON, which may be
-              gzipped, whose `config` or `session` is NAME
+    recorded: {file: FILE, config: NAME}, further steps: those of a list in JSON (.gz and .xz,
+              too) whose `config` or `session` is NAME
 
 A step has `family`, `input` and, if it was recorded, `expected` or `cpp`, the answer of C++
 move_base; what that does not have is not compared:
@@ -19,6 +19,7 @@ move_base; what that does not have is not compared:
     action    a goal or a cancel as in recordings, see transcript_action
     goal      [x, y, yaw, frame]; the next step comes when the goal is active
     cancel    seconds to wait after a cancel of all goals
+    marks     further marks of the world, as there
     wait      seconds of simulated time
     params    {name: value}, by dynamic_reconfigure; a name may have a namespace: GlobalPlanner/...
 
@@ -32,6 +33,7 @@ from __future__ import annotations
 import argparse
 import gzip
 import json
+import lzma
 import multiprocessing
 import sys
 from pathlib import Path
@@ -54,6 +56,7 @@ FAMILIES: Dict[str, Answer] = {
     "action": transcript_action.answer,
     "goal": lambda session, place: session.send_goal(place),
     "cancel": lambda session, seconds: session.cancel(seconds),
+    "marks": lambda session, lines: session.mark(lines),
     "wait": lambda session, seconds: session.wait(seconds),
     "params": lambda session, changes: session.reconfigure(changes),
 }
@@ -68,7 +71,7 @@ def load(path: Path) -> Dict[str, Any]:
     steps = list(session.get("steps", []))
     if "recorded" in session:
         recorded, name = path.parent / session["recorded"]["file"], session["recorded"]["config"]
-        opened = gzip.open if recorded.suffix == ".gz" else open
+        opened = {".gz": gzip.open, ".xz": lzma.open}.get(recorded.suffix, open)
         with opened(recorded, "rt", encoding="utf-8") as file:
             steps += [s for s in json.load(file) if name in (s.get("config"), s.get("session"))]
     unknown = {step["family"] for step in steps} - FAMILIES.keys()

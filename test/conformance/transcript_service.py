@@ -15,8 +15,8 @@ from transcript_world import pose_from_yaw
 def answer(session: Session, request: Dict[str, Any]) -> Dict[str, Any]:
     """Call a service: a plan's poses, frames and stamps, or {} of an empty answer.
 
-    ``P`` are all poses, ``end`` the last two and ``last`` the last one. ``stamps`` are seconds from
-    the call, to a tenth; ``header`` has its frame and whether it has a stamp.
+    ``P`` are all poses, ``last`` is the last one. ``stamps`` are seconds from the call and its
+    answer, to a tenth; ``header`` has its frame and whether it has a stamp.
     """
     name, now = session.name(f"~{request['service']}"), session.now()
     kind = GetPlan if name.endswith("make_plan") else Empty
@@ -32,15 +32,20 @@ def answer(session: Session, request: Dict[str, Any]) -> Dict[str, Any]:
         ).plan
     except (rospy.ServiceException, rospy.ROSException) as error:
         return {"error": session.anonymous(f"{type(error).__name__}: {error}")}
+    end = session.now()
     return {
         "n": len(plan.poses),
         "header": [session.anonymous(plan.header.frame_id), not plan.header.stamp.is_zero()],
         "frames": sorted({session.anonymous(pose.header.frame_id) for pose in plan.poses}),
-        "stamps": sorted({round((pose.header.stamp - now).to_sec(), 1) for pose in plan.poses}),
+        "stamps": sorted({seconds_outside(pose.header.stamp, now, end) for pose in plan.poses}),
         "P": [numbers(pose.pose) for pose in plan.poses],
         "last": [numbers(pose.pose) for pose in plan.poses[-1:]],
-        "end": [numbers(pose.pose) for pose in plan.poses[-2:]],
     }
+
+
+def seconds_outside(stamp: rospy.Time, begin: rospy.Time, end: rospy.Time) -> float:
+    """How long before or after a time it is, to a tenth; 0 within it."""
+    return round((stamp - min(max(stamp, begin), end)).to_sec(), 1)
 
 
 def stamped(session: Session, place: Sequence[Any], now: rospy.Time) -> PoseStamped:

@@ -132,6 +132,11 @@ class Session:
     def _note_status(self, message: GoalStatusArray) -> None:
         self._statuses = [one.status for one in message.status_list]
 
+    def mark(self, lines: List[List[float]]) -> None:
+        """Add marks to the world, and wait until the costmaps have them."""
+        self._world.marks = [*self._world.marks, *lines]
+        self.wait(1.0)
+
     def reconfigure(self, changes: Dict[str, Any]) -> None:
         """Change parameters of the node, or of a namespace below it."""
         for name, value in changes.items():

@@ -12,7 +12,9 @@ import tf2_ros
 from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped, Twist
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import LaserScan
+from sensor_msgs.msg import LaserScan, PointCloud2
+from sensor_msgs.point_cloud2 import create_cloud_xyz32
+from std_msgs.msg import Header
 
 Placement = Tuple[float, float, float]
 
@@ -24,7 +26,8 @@ class World:
     Attributes:
         start: Pose of the robot in the map: x, y in m, yaw in rad.
         map_from_odom: Pose of the odometry's frame in the map.
-        boxes: Each [x0, y0, x1, y1] in the map, in metres.
+        boxes: Each [x0, y0, x1, y1] in the map, in metres. The LIDAR sees them.
+        marks: Points of obstacles on the topic marks@, every 0.05 m on lines [x0, y0, x1, y1].
         beams: Of the LIDAR, which looks all around.
         range_m: Of the LIDAR.
         acceleration: Of the body, m/s2 and rad/s2; 0: it takes over a command at once.
@@ -34,6 +37,7 @@ class World:
     start: Sequence[float] = (2.0, 2.0, 0.0)
     map_from_odom: Sequence[float] = (0.0, 0.0, 0.0)
     boxes: List[Sequence[float]] = field(default_factory=list)
+    marks: List[Sequence[float]] = field(default_factory=list)
     beams: int = 360
     range_m: float = 10.0
     acceleration: float = 0.0
@@ -76,6 +80,14 @@ class World:
         nearest[nearest > self.range_m] = np.inf
         return nearest.astype(np.float32)
 
+    def marked_points(self) -> List[Tuple[float, float, float]]:
+        """Points (x, y, z) of the marks in the map."""
+        points = []
+        for line in np.reshape(self.marks, (-1, 2, 2)):
+            steps = max(1, round(float(np.abs(line[1] - line[0]).max()) / 0.05))
+            points += [(x, y, 0.5) for x, y in np.linspace(*line, steps + 1).tolist()]
+        return points
+
 
 def pose_from_yaw(x: float, y: float, turn: Any) -> Pose:
     """A pose with a yaw or, if it is a list, a quaternion."""
@@ -94,6 +106,7 @@ class WorldTopics:
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10)
         self._odom = rospy.Publisher(f"/odom{robot}", Odometry, queue_size=10)
         self._scan = rospy.Publisher(f"/scan{robot}", LaserScan, queue_size=10)
+        self._marks = rospy.Publisher(f"/marks{robot}", PointCloud2, queue_size=10)
         self._tf = tf2_ros.TransformBroadcaster()
         rospy.Subscriber(f"/cmd_vel{robot}", Twist, self._obey)
 
@@ -130,6 +143,8 @@ class WorldTopics:
         scan.angle_increment = 2.0 * math.pi / world.beams
         scan.range_max, scan.ranges = world.range_m, world.ranges().tolist()
         self._scan.publish(scan)
+        header = Header(0, now, "map")
+        self._marks.publish(create_cloud_xyz32(header, world.marked_points()))
 
 
 def transform(parent: str, child: str, now: rospy.Time, place: Sequence[float]) -> TransformStamped:

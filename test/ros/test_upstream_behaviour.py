@@ -8,7 +8,7 @@ Intended differences:
   arrived in ``current_goal`` until its transform is there;
 * a search that fails is repeated once per control cycle, not as fast as it goes, and empties
   ``NavfnROS/plan`` for goals off the map too;
-* a refused ``make_plan`` returns the reason;
+* a refused ``make_plan`` returns the reason; for a tolerance above 10 m there is no plan;
 * a stop follows a rotation recovery; C++ move_base continues to rotate for planner_patience.
 """
 
@@ -51,12 +51,13 @@ class UpstreamBehaviour(UpstreamCase):
         self.wait(lambda: self.speed(0) > 0.05, "robot 0 under way")
         return self.next_feedback(0)
 
-    def make_plan(self, x, y, tolerance=0.0, service="make_plan"):
+    def make_plan(self, x, y, tolerance=0.0, service="make_plan", frames=("map", "map"), w=1.0):
+        """A plan; the frames are the start's and the goal's."""
         rospy.wait_for_service(f"/move_base0/{service}", PATIENCE_S)
-        start = goal_pose(*self.position(0))
-        return rospy.ServiceProxy(f"/move_base0/{service}", GetPlan)(
-            start, goal_pose(x, y), tolerance
-        ).plan
+        start = goal_pose(*self.position(0), frame=frames[0])
+        goal = goal_pose(x, y, w, frames[1])
+        proxy = rospy.ServiceProxy(f"/move_base0/{service}", GetPlan)
+        return proxy(start, goal, tolerance).plan
 
     def obstacle_cells(self, nearest_m, farthest_m=math.inf):
         """Centres of the cells of seen obstacles within these distances of robot 0."""
@@ -90,7 +91,9 @@ class UpstreamBehaviour(UpstreamCase):
         for service in ("make_plan", "NavfnROS/make_plan"):
             plans = self.record("/move_base0/NavfnROS/plan", Path)
             plan = self.make_plan(9.0, 5.5, service=service)
-            self.assertEqual(plan.header.frame_id, "")
+            of_planner = service != "make_plan"
+            self.assertEqual(plan.header.frame_id, "map" if of_planner else "")
+            self.assertEqual(not plan.header.stamp.is_zero(), of_planner)
             self.assertGreater(len(plan.poses), 100)
             self.assertEqual(self.end_distance(plan, 9.0, 5.5), 0.0)
             self.wait(lambda p=plans: len(p.messages) == 2, "the plan twice")
@@ -101,6 +104,24 @@ class UpstreamBehaviour(UpstreamCase):
 
     def test_make_plan_off_the_map_is_empty(self):
         self.assertEqual(self.make_plan(*OFF_THE_MAP).poses, [])
+
+    def test_make_plan_answers_odd_requests_with_an_empty_plan(self):
+        x, y = self.far_place()
+        odd = (
+            {"frames": ("map", "odom0")},
+            {"frames": ("odom0", "map")},
+            {"frames": ("map", "")},
+            {"frames": ("map", "nowhere")},
+            {"w": 0.0},
+            {"tolerance": 20.0},
+            {"tolerance": math.nan},
+            {"frames": ("", "map"), "service": "NavfnROS/make_plan"},
+        )
+        for request in odd:
+            with self.subTest(**request):
+                self.assertEqual(self.make_plan(x, y, **request).poses, [])
+        self.assertEqual(self.make_plan(math.nan, y).poses, [])
+        self.assertTrue(self.make_plan(x, y, frames=("", "/map")).poses)
 
     def test_make_plan_into_an_obstacle_needs_a_tolerance(self):
         x, y = self.obstacle_cell()

@@ -194,9 +194,10 @@ class StateMachine:
             and self._control.track(tick.now_s, poses.in_global, self.params.oscillation_distance_m)
         ):
             self._recovery.reset_after(Trigger.OSCILLATION)
-        # Upstream goes on without a pose: planning and control fail, and recoveries follow.
-        data = self.missing_data(tick.now_s, poses) if self.stops_without_data else ""
-        missing = data or self._updates.outdated_reason(tick.now_s)
+        if self.stops_without_data:
+            missing = self.missing_data(tick.now_s, poses)
+        else:  # upstream goes on without a pose: planning and control fail, and recoveries follow
+            missing = self._updates.outdated_reason(tick.now_s)
         if missing:
             self.stop_without_data(tick, missing)
             return

@@ -9,7 +9,7 @@ from costmap_maps import costs_of
 from quad_nav.errors import NoPath
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, LETHAL, GridSpec
-from quad_nav.plan.navfn import Navfn, NavfnParams, potential_from
+from quad_nav.plan.navfn import Navfn, NavfnParams, path_from, potential_from
 from quad_nav.plan.wavefront_kernel import (
     NOT_REACHED,
     WaveParams,
@@ -173,3 +173,12 @@ def test_potential_of_a_goal_in_an_obstacle_is_that_of_the_whole_wave():
     costs[:] = LETHAL  # the potential is that of the time of the plan
 
     assert planner.potential[1].tolist() == [1e10, 0, 50, 100, 150, 200, 1e10]
+
+
+def test_beside_unreached_cells_a_neighbour_is_lower_if_it_is_below_the_whole_number():
+    potential = np.full((5, 6), NOT_REACHED, dtype=np.float32)
+    potential[2, 2], potential[1, 1] = 100.9, 100.2  # not below 100
+    potential[1, 3], potential[3, 1] = 99.5, 99.1  # below 100, and not below 99
+    potential[1, 4] = 10.0
+    path, arrived = path_from(potential, (2, 2), (4, 1))
+    assert path.tolist() == [[2.0, 2.0], [3.0, 1.0], [4.0, 1.0]] and arrived
