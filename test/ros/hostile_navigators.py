@@ -13,7 +13,7 @@ import rospy
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
 from fake_ros import FakeRos, FakeService, deliver
-from geometry_msgs.msg import Point32, Pose, PoseStamped, Quaternion, Twist, Vector3
+from geometry_msgs.msg import Point32, Polygon, Pose, PoseStamped, Quaternion, Twist, Vector3
 from map_msgs.msg import OccupancyGridUpdate
 from move_base_msgs.msg import MoveBaseActionGoal
 from nav_msgs.msg import OccupancyGrid, Odometry
@@ -114,11 +114,15 @@ class Navigators:
             f"/scan{k}": lambda: self._scan(k),
             f"/cloud{k}": lambda: self._cloud(k),
             f"/cloud2_{k}": lambda: self._cloud2(k),
+            **dict.fromkeys(self._footprint_topics(k), self._footprint),
             names("move_base_simple/goal"): lambda: self._goal(k),
             names("move_base/goal"): lambda: self._action_goal(k),
             names("move_base/cancel"): lambda: self._action_goal(k).goal_id,
             f"/move_base{k}/cancel": lambda: self._action_goal(k).goal_id,
         }
+
+    def _footprint_topics(self, k: int) -> List[str]:
+        return [f"{self._names[k](f'~{name}_costmap')}/footprint" for name in ("global", "local")]
 
     # -- what happens between hostile messages ---------------------------------------
 
@@ -149,6 +153,9 @@ class Navigators:
     def recover(self) -> None:
         """Send good messages on every topic; each robot flies to its goal again."""
         deliver("/map", self._map())
+        for k in self._names:
+            for topic in self._footprint_topics(k):
+                deliver(rospy.resolve_name(topic), self._footprint())
         self.fly(1.0)
         for k, names in self._names.items():
             deliver(rospy.resolve_name(names("move_base_simple/goal")), self._goal(k))
@@ -249,6 +256,10 @@ class Navigators:
         return TFMessage(
             [conversions.transform_message(pose, "base_link0", "camera0", rospy.Time())]
         )
+
+    def _footprint(self) -> Polygon:
+        corners = ((0.3, 0.3), (-0.3, 0.3), (-0.3, -0.3), (0.3, -0.3))
+        return Polygon([Point32(x, y, 0.0) for x, y in corners])
 
     def _intention(self, k: int) -> PathMessage:
         path = PathMessage(poses=[self._goal(k), self._goal(k)])

@@ -7,7 +7,7 @@ import rospy
 import rostest
 from dynamic_reconfigure.msg import Config, ConfigDescription
 from flight_case import PATIENCE_S, goal_pose
-from geometry_msgs.msg import PolygonStamped, Twist
+from geometry_msgs.msg import Point32, Polygon, PolygonStamped, Twist
 from move_base_msgs.msg import MoveBaseActionFeedback
 from upstream_case import ROBOTS, UpstreamCase, recorded_yaml
 
@@ -153,6 +153,26 @@ class UpstreamReconfigure(UpstreamCase):
         footprints = self.record("/move_base1/local_costmap/footprint", PolygonStamped)
         self.wait(lambda: len(footprints.messages) > 40, "forty footprints")
         self.assertAlmostEqual(footprints.rate_hz(), 8.0, delta=0.8)
+
+    def test_footprint_comes_from_its_topic_until_its_parameters_change(self):
+        topic = "/move_base1/local_costmap/footprint"
+        footprints = self.record(topic, PolygonStamped)
+
+        def corners():
+            return len(footprints.messages[-1].polygon.points) if footprints.messages else 0
+
+        self.wait(lambda: corners() == 16, "the circle")
+        arm = rospy.Publisher(topic, Polygon, queue_size=1)
+        self.addCleanup(arm.unregister)
+        self.wait(lambda: arm.get_num_connections() > 0, "the navigator listens")
+        arm.publish(Polygon([Point32(0.5, 0.3, 0), Point32(-0.3, 0.3, 0), Point32(0.0, -0.3, 0)]))
+        self.wait(lambda: corners() == 3, "the triangle")
+        self.reconfigure("/move_base1/local_costmap", footprint_padding=0.1)
+        count = len(footprints.messages)
+        self.wait(lambda: len(footprints.messages) > count + 1, "two footprints")
+        self.assertEqual(corners(), 3)
+        self.reconfigure("/move_base1/local_costmap", robot_radius=0.4)
+        self.wait(lambda: corners() == 16, "the circle again")
 
 
 if __name__ == "__main__":

@@ -27,6 +27,8 @@ MAX_TIME_S = 2.0**32
 """End of the range of ROS times."""
 MAX_MAGNITUDE = 1e6
 """Largest accepted position coordinate in m, and speed in m/s or rad/s."""
+MAX_OUTLINE_M = 100.0
+"""Largest accepted coordinate of a footprint; what peers compute grows with it."""
 MAX_ANGLE_RAD = 1e3
 """Largest accepted first angle of a scan, and largest angle between two beams."""
 MAX_FRAME_ID = 200
@@ -99,8 +101,8 @@ def footprint_problem(points: NDArray[np.float64]) -> str:
     """Check that a footprint, float64[n, 2] in metres, is a polygon of finite points."""
     if not 3 <= len(points) <= MAX_CORNERS:
         return f"{len(points)} points, expected 3 to {MAX_CORNERS}"
-    if not (np.abs(points) <= MAX_MAGNITUDE).all():
-        return f"coordinates that are not finite or beyond {MAX_MAGNITUDE:g} m"
+    if not (np.abs(points) <= MAX_OUTLINE_M).all():
+        return f"coordinates that are not finite or beyond {MAX_OUTLINE_M:g} m"
     return ""
 
 

@@ -137,8 +137,8 @@ def test_a_footprint_from_its_topic_decides_costs_and_commands(ros, robot):
     "points, reason",
     [
         (ARM[:2], "2 points, expected 3 to 1000"),
-        ([*ARM[:3], (math.nan, 0.0)], "coordinates that are not finite or beyond 1e+06 m"),
-        ([*ARM[:3], (1e7, 0.0)], "coordinates that are not finite or beyond 1e+06 m"),
+        ([*ARM[:3], (math.nan, 0.0)], "coordinates that are not finite or beyond 100 m"),
+        ([*ARM[:3], (101.0, 0.0)], "coordinates that are not finite or beyond 100 m"),
     ],
 )
 def test_a_footprint_that_is_none_is_dropped(ros, robot, points, reason):
