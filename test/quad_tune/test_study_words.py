@@ -62,9 +62,11 @@ def test_files_reach_the_terminal_without_control_sequences(tmp_path):
     quad("sweep", *files, *OVER, "--cache", tmp_path / "f.db", shown=False)
 
 
-def test_a_study_without_optuna_says_how_to_get_it():
+@pytest.mark.parametrize("command", ["tune", "sweep"])
+def test_a_study_without_optuna_says_how_to_get_it(command):
     script = (
-        "import sys; sys.modules['optuna'] = None\nfrom quad_nav.cli import main; main(['tune'])"
+        "import sys; sys.modules['optuna'] = None\n"
+        f"from quad_nav.cli import main; main(['{command}'])"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     refused = subprocess.run(
@@ -72,6 +74,6 @@ def test_a_study_without_optuna_says_how_to_get_it():
     )
     assert (refused.returncode, refused.stderr) == (
         1,
-        "Error: quad tune: optuna is not installed; "
+        f"Error: quad {command}: optuna is not installed; "
         "expected it from pip install 'quad-nav[tune]'\n",
     )

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from quad_nav.cli import add_ons
 from quad_nav.cli.options import A_FILE, A_FOLDER, COUNT, OUTPUT
 from quad_tune.cli.study_options import flown_options, worker_options
 
@@ -75,6 +76,4 @@ def sweep(**given: Any) -> None:
     invalid input, 130 after Ctrl-C.
     """
     # Imported here: the engine loads slowly, and --help does not need it.
-    from quad_tune.cli.sweep_flights import fly_sweep
-
-    fly_sweep(**given)
+    add_ons.load("quad_tune.cli.sweep_flights", "quad sweep").fly_sweep(**given)
