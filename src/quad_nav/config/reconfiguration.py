@@ -61,8 +61,7 @@ def updated(
         configuration: The configuration in force.
         namespace: A namespace of ``reconfigurable``.
         changes: Name -> new value.
-        stored: Namespaces of other planners as they are now, such as on a parameter server; by
-            default they are as they were loaded.
+        stored: Namespaces of other planners, where they are not as they were loaded.
 
     Raises:
         InputError: One line for every change that is refused; then no change is made.
