@@ -18,7 +18,7 @@ from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
 from quad_nav.navigator.tick import RobotPoses, State, Trigger
 from quad_nav.peers.coordinator import PeerCoordinator
-from quad_nav.plan.planner import ring_offsets
+from quad_nav.plan.planner import plan_near, ring_offsets
 from quad_nav.recovery import Step
 
 HERE = Pose2D(1.0, 1.0, 0.0)
@@ -282,6 +282,16 @@ def test_rings_are_summed_in_single_precision():
     assert list(ring_offsets(0.05, tenth, tenth))[0] == (-tenth, 0.0)
     assert list(ring_offsets(0.05, third, tenth)) == []
     assert list(ring_offsets(0.05, math.inf, math.nan)) == []
+
+
+@pytest.mark.parametrize("place", [Pose2D(2.0, 2.0), Pose2D(50.0, 2.0), Pose2D(math.nan, 2.0)])
+def test_a_search_without_end_stops_at_the_map(place):
+    class Nowhere:
+        def make_plan(self, *_):
+            raise NoPath("nowhere")
+
+    with pytest.raises(NoPath):
+        plan_near(Nowhere(), GridSpec(9, 9, 0.5), np.zeros((9, 9)), GOAL, place, math.inf)
 
 
 def test_shutdown_costmaps_skips_updates_without_a_goal():
