@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from io import BytesIO
-from typing import List, Mapping, Tuple
+from typing import Any, List, Mapping, Tuple
 
 import numpy as np
 import rospy
@@ -133,13 +133,16 @@ class _Floats(np.ndarray):
         return self.tobytes()
 
 
-class ScanMessage(numpy_msg(LaserScan)):
+_ArrayScan: Any = numpy_msg(LaserScan)
+
+
+class ScanMessage(_ArrayScan):
     """A LaserScan whose ranges are an array, which rospy serialises without conversion."""
 
     def serialize(self, buff: BytesIO) -> None:
         """Write the message."""
-        self.ranges = np.asarray(self.ranges, np.float32).view(_Floats)
-        self.intensities = np.asarray(self.intensities, np.float32).view(_Floats)
+        for name in ("ranges", "intensities"):
+            setattr(self, name, np.asarray(getattr(self, name), np.float32).view(_Floats))
         super().serialize(buff)
 
 
