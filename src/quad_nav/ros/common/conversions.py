@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from io import BytesIO
-from typing import List, Mapping, Tuple
+from typing import Any, List, Mapping, Tuple
 
 import numpy as np
 import rospy
@@ -21,7 +21,6 @@ from geometry_msgs.msg import (
     Vector3,
 )
 from nav_msgs.msg import Odometry
-from numpy.typing import NDArray
 from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
@@ -134,16 +133,16 @@ class _Floats(np.ndarray):
         return self.tobytes()
 
 
-class ScanMessage(numpy_msg(LaserScan)):  # type: ignore[misc]
-    """A LaserScan whose ranges are an array, which rospy serialises without conversion."""
+_ArrayScan: Any = numpy_msg(LaserScan)
 
-    ranges: NDArray[np.float32]
-    intensities: NDArray[np.float32]
+
+class ScanMessage(_ArrayScan):
+    """A LaserScan whose ranges are an array, which rospy serialises without conversion."""
 
     def serialize(self, buff: BytesIO) -> None:
         """Write the message."""
-        self.ranges = np.asarray(self.ranges, np.float32).view(_Floats)
-        self.intensities = np.asarray(self.intensities, np.float32).view(_Floats)
+        for name in ("ranges", "intensities"):
+            setattr(self, name, np.asarray(getattr(self, name), np.float32).view(_Floats))
         super().serialize(buff)
 
 
