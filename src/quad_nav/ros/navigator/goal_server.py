@@ -169,8 +169,9 @@ class GoalServer:
             ) from error
 
     def publish_feedback(self, pose: Pose3D, now: rospy.Time) -> None:
-        """Publish the robot's pose in the global frame while a goal is active."""
-        if self._server.is_active():
+        """Publish the pose in the global frame for listeners, while a goal is active."""
+        listeners = self._server.action_server.feedback_pub.get_num_connections()
+        if listeners and self._server.is_active():
             self._server.publish_feedback(
                 MoveBaseFeedback(pose_stamped(pose, self._global_frame, now))
             )

@@ -90,7 +90,8 @@ class PlanTopics:
         now = time_message(tick.now_s)
         for topic, fields in self._schedule.pop(tick, pose.to_2d()):
             publisher = self._of_robot[topic.name]
-            publisher.publish(stamped(publisher.data_class, fields, tick.now_s))
+            if topic.is_latched or publisher.get_num_connections():
+                publisher.publish(stamped(publisher.data_class, fields, tick.now_s))
         if tick.command is not None:
             self._command.publish(twist_message(tick.command))
         if tick.plan is not None:
