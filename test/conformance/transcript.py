@@ -82,9 +82,11 @@ def load(path: Path) -> Dict[str, Any]:
 
 def merged(base: Dict[str, Any], changes: Dict[str, Any]) -> Dict[str, Any]:
     """A tree with the values of another one in their places."""
-    both = {key: merged(base[key], changes[key]) for key in base.keys() & changes.keys()
-            if isinstance(base[key], dict) and isinstance(changes[key], dict)}  # fmt: skip
-    return {**base, **changes, **both}
+    both = dict(base)
+    for key, value in changes.items():
+        is_tree = isinstance(value, dict) and isinstance(both.get(key), dict)
+        both[key] = merged(both[key], value) if is_tree else value
+    return both
 
 
 def play(path: Path, nav: str) -> List[Dict[str, Any]]:
