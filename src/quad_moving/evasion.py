@@ -7,7 +7,7 @@ The wish stays if it keeps clear; else the nearest velocity that does replaces i
 ways to fly:
 
 * The robot keeps clear for a time, ``horizon``. Where no velocity does, it flies the one with which
-  an obstacle needs the greatest acceleration to touch it. This is for what does not react.
+  it is least deep in what obstacles can reach. This is for what does not react.
 * With ``horizon`` 0 it keeps clear until it is at rest, where it may be touched; if it cannot, it
   brakes. This is passive safety, for people, who go around a robot that rests.
 
@@ -33,7 +33,7 @@ from quad_moving.reachable import (
     Flight,
     Obstacles,
     Standing,
-    needed_accelerations,
+    overlaps,
 )
 from quad_nav.config.plugins import Parameters
 from quad_nav.control.dwa_planner_params import DwaParams
@@ -159,15 +159,15 @@ class Evasion(CommandFilter):
         now = np.array(pose.rotate(velocity.vx_mps, velocity.vy_mps))
         speed_mps = max(self.params.max_speed_mps, usual_mps)
         commands = self._limited(np.concatenate([[wished], polar_grid(speed_mps)]), situation)
-        needed_mps2 = self._needed_mps2(commands, now, tracks, situation)
-        is_clear = needed_mps2 >= self.params.max_acceleration_mps2
+        depths = self._overlaps(commands, now, tracks, situation)
+        is_clear = depths == 0.0
         if is_clear[0]:
             return None
         if is_clear.any():
             away_mps = np.hypot(*(commands - wished).T)
             best = commands[int(np.argmin(np.where(is_clear, away_mps, np.inf)))]
-        elif self.params.horizon_s > 0.0 and needed_mps2.max() > BLOCKED:
-            best = commands[int(np.argmax(needed_mps2))]
+        elif self.params.horizon_s > 0.0 and depths.min() < BLOCKED:
+            best = commands[int(np.argmin(depths))]
         elif self.params.horizon_s > 0.0 and np.hypot(*now) <= usual_mps:
             return None  # the robot is too near to what stands: the navigator leads it out
         else:
@@ -183,20 +183,18 @@ class Evasion(CommandFilter):
         limited = cell.limit_velocities(in_map)
         return np.column_stack(situation.local_from_global.rotate(*limited.T))
 
-    def _needed_mps2(
+    def _overlaps(
         self, commands: Floats, velocity: Floats, tracks: Tracks, situation: Situation
     ) -> Floats:
-        """Return which acceleration an obstacle needs to touch the robot, float64[c]."""
+        """Return how deep the robot is in what obstacles can reach, float64[c]."""
         horizon_s, hold_s = self.params.horizon_s, HOLD_PERIODS * situation.period_s
         hold = max(round(hold_s / STEP_S), 1)
         flight = Flight(STEP_S, math.ceil(horizon_s / STEP_S), hold, horizon_s == 0.0)
         radius_m = situation.costmap.inscribed_radius_m + self.params.clearance_m
         obstacles = obstacles_of(self.params, tracks, situation.pose, radius_m)
-        needed_mps2 = np.empty(len(commands))
-        needed_accelerations(
-            BODY, standing_of(situation), obstacles, flight, velocity, commands, needed_mps2
-        )
-        return needed_mps2
+        found = np.empty(len(commands))
+        overlaps(BODY, standing_of(situation), obstacles, flight, velocity, commands, found)
+        return found
 
 
 def obstacles_of(params: EvasionParams, tracks: Tracks, pose: Pose2D, radius_m: float) -> Obstacles:
@@ -212,7 +210,7 @@ def obstacles_of(params: EvasionParams, tracks: Tracks, pose: Pose2D, radius_m: 
     speeds_mps = np.maximum(np.hypot(*states[:, 2:].T), params.max_obstacle_speed_mps)
     states[:, :2] -= (pose.x_m, pose.y_m)
     radii_m = np.append(tracks.radii_m, tracks.suspects[:, 4]) + radius_m
-    return Obstacles(states, radii_m, speeds_mps)
+    return Obstacles(states, radii_m, speeds_mps, params.max_acceleration_mps2)
 
 
 def polar_grid(max_speed_mps: float) -> Floats:

@@ -1,4 +1,4 @@
-"""The acceleration that an obstacle needs to reach a robot, for each of many commands.
+"""How far obstacles can reach into a robot, for each of many commands.
 
 ``evasion`` has the reasoning. Velocities are float64[2] along the axes of the local costmap's frame
 in m/s, places are relative to the robot in metres, times are multiples of a step.
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from quad_nav.files.kernel_cache import njit
 
-BLOCKED = -np.inf
+BLOCKED = np.inf
 """Result for a command after which the robot cannot stop before what stands."""
 
 
@@ -43,6 +43,7 @@ class Obstacles(NamedTuple):
     states: NDArray[np.float64]  # [n, 4], x, y, vx and vy
     radii_m: NDArray[np.float64]  # [n], distances of centres at which they touch the robot
     speeds_mps: NDArray[np.float64]  # [n], the greatest ones
+    acceleration_mps2: float  # the greatest one
 
 
 class Flight(NamedTuple):
@@ -55,19 +56,21 @@ class Flight(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def needed_accelerations(
+def overlaps(
     body: Body,
     standing: Standing,
     obstacles: Obstacles,
     flight: Flight,
     velocity: NDArray[np.float64],
     commands: NDArray[np.float64],
-    needed: NDArray[np.float64],
+    found: NDArray[np.float64],
 ) -> None:
-    """Find the least acceleration with which an obstacle touches the robot, for each command.
+    """Add up how deep what obstacles can reach lies in the robot, for each command.
 
-    An obstacle that needs to be off the way of its velocity by a distance d after a time t needs
-    the acceleration 2 d / t^2. It is negative if the obstacle touches the robot anyway.
+    After a time t an obstacle is within a t^2 / 2 of where its velocity leads it, with the greatest
+    acceleration a, and within the way of its greatest speed. The greatest depth until then is added
+    up over the time, so that late is better and nothing is gained by flying through an obstacle. It
+    is 0 if no obstacle can touch the robot.
 
     Args:
         body: Response of the body.
@@ -76,15 +79,15 @@ def needed_accelerations(
         flight: How the commands are flown.
         velocity: The robot's velocity.
         commands: float64[c, 2].
-        needed: float64[c], written: m/s^2; +inf if no obstacle can touch the robot, ``BLOCKED`` if
-            the robot cannot stop before what stands.
+        found: float64[c], written: m s, or ``BLOCKED`` if the robot cannot stop before what stands.
     """
     inside = _is_blocked(standing, 0.0, 0.0, 0.0, 0.0)
     for c in range(commands.shape[0]):
-        needed[c] = np.inf
+        found[c] = 0.0
         if not _stops_in_time(body, standing, flight, velocity, commands[c]):
-            needed[c] = BLOCKED
+            found[c] = BLOCKED
             continue
+        deepest = 0.0
         state = (0.0, 0.0, velocity[0], velocity[1])
         k = 0
         while k < flight.steps or flight.rests:
@@ -98,7 +101,8 @@ def needed_accelerations(
                 if stops:
                     break
                 continue
-            needed[c] = min(needed[c], _needed(obstacles, k * flight.step_s, state[0], state[1]))
+            deepest = max(deepest, _depth(obstacles, k * flight.step_s, state[0], state[1]))
+            found[c] += flight.step_s * deepest
 
 
 @njit(cache=True, nogil=True)
@@ -154,17 +158,18 @@ def _is_blocked(standing: Standing, x: float, y: float, vx: float, vy: float) ->
 
 
 @njit(cache=True, nogil=True)
-def _needed(obstacles: Obstacles, after_s: float, x: float, y: float) -> float:
-    """Return the least acceleration with which an obstacle is at a place after a time.
+def _depth(obstacles: Obstacles, after_s: float, x: float, y: float) -> float:
+    """Return how deep a robot at a place is in what obstacles can reach in a time, or 0.
 
     An obstacle that touches the robot already counts as smaller: the robot may fly away from it.
     """
-    least = np.inf
+    deepest = 0.0
+    reach = 0.5 * obstacles.acceleration_mps2 * after_s * after_s
     for n in range(obstacles.states.shape[0]):
         ox, oy, vx, vy = obstacles.states[n]
         radius = min(obstacles.radii_m[n], math.hypot(ox, oy))
         if math.hypot(x - ox, y - oy) >= radius + obstacles.speeds_mps[n] * after_s:
             continue
         off = math.hypot(x - ox - after_s * vx, y - oy - after_s * vy) - radius
-        least = min(least, 2.0 * off / (after_s * after_s))
-    return least
+        deepest = max(deepest, reach - off)
+    return deepest

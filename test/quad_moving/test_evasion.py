@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from quad_moving.evasion import BODY, Evasion, usual_speed_mps
-from quad_moving.reachable import Body, Flight, Obstacles, Standing, needed_accelerations
+from quad_moving.reachable import Body, Flight, Obstacles, Standing, overlaps
 from quad_nav.config.plugins import Parameters
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
@@ -62,37 +61,49 @@ def evade(command, seen, params=None, **around):
     return Evasion(Parameters(params, "evasion")).filter(command, situation(seen, **around))
 
 
-def needed(command, state, velocity=(0.0, 0.0), rests=False, hold=2, standing=None, body=None):
-    """What an obstacle of 0.5 m, at most 1.6 m/s fast, needs within 3 s; steps of 0.1 s.
+def overlap(
+    command, state, velocity=(0.0, 0.0), rests=False, hold=2, standing=None, body=None, limit=1.0
+):
+    """How deep the robot is within 3 s in what an obstacle of 0.5 m, at most 1.6 m/s fast, reaches.
 
-    The body follows a command at once unless another one is given.
+    Steps are of 0.1 s. The body follows a command at once unless another one is given. The
+    obstacle's greatest acceleration is ``limit``.
     """
     standing = standing or Standing(np.zeros((1, 1), np.uint8), 0.0, 0.0, 1.0, 253)
     flight, found = Flight(0.1, 30, hold, rests), np.empty(1)
-    obstacles = Obstacles(np.array([state], float), np.array([0.5]), np.array([1.6]))
+    obstacles = Obstacles(np.array([state], float), np.array([0.5]), np.array([1.6]), limit)
     body = body or Body(10.0, 1e3, 0.05)
     velocity, commands = np.array(velocity), np.array([command], float)
-    needed_accelerations(body, standing, obstacles, flight, velocity, commands, found)
+    overlaps(body, standing, obstacles, flight, velocity, commands, found)
     return found[0]
 
 
-def test_an_obstacle_needs_an_acceleration_to_touch_a_hovering_robot():
-    """It stands 1.5 m away: with 2 * 1 m / (3 s)^2 it is there after 3 s; 1.6 m/s is enough."""
-    assert needed([0.0, 0.0], [1.5, 0.0, 0.0, 0.0]) == pytest.approx(2.0 / 9.0)
+def test_what_an_obstacle_reaches_with_its_greatest_acceleration():
+    """It stands 1.5 m away: with 2 * 1 m / (3 s)^2 it is there after 3 s; 1.6 m/s is enough.
+
+    With 0.25 m/s^2 it is 0.051 m too near after 2.9 s and 0.125 m after 3 s.
+    """
+    stands = [1.5, 0.0, 0.0, 0.0]
+    assert overlap([0.0, 0.0], stands, limit=2.0 / 9.0 - 1e-9) == 0.0
+    assert overlap([0.0, 0.0], stands, limit=0.25) == pytest.approx(0.1 * (0.05125 + 0.125))
 
 
 def test_a_robot_at_rest_may_be_touched_if_it_rests():
     coming = [1.5, 0.0, -1.0, 0.0]
-    assert needed([0.0, 0.0], coming, rests=True) == math.inf
-    assert needed([0.0, 0.0], coming) < 0.0
+    assert overlap([0.0, 0.0], coming, rests=True) == 0.0
+    assert overlap([0.0, 0.0], coming) > 0.0
 
 
 def test_a_robot_that_brakes_in_time_is_clear():
-    """It flies 0.2 m in 0.2 s and brakes at 2 m/s^2: 0.25 m more and half a second."""
+    """It flies 0.2 m in 0.2 s and brakes at 2 m/s^2: 0.24 m more and half a second.
+
+    An obstacle that stands 1.2 m ahead needs 2 (1.2 - 0.44 - 0.5) / 0.6^2 = 1.44 m/s^2.
+    """
     body = Body(10.0, 2.0, 0.05)
-    stands = [1.2, 0.0, 0.0, 0.0]
-    found = needed([1.0, 0.0], stands, (1.0, 0.0), rests=True, body=body)
-    assert found == pytest.approx(2.0 * (1.2 - 0.44 - 0.5) / 0.6**2, rel=0.01)
+    ahead = [1.2, 0.0, 0.0, 0.0]
+    for limit, is_clear in ((1.4, True), (1.5, False)):
+        found = overlap([1.0, 0.0], ahead, (1.0, 0.0), rests=True, body=body, limit=limit)
+        assert bool(found == 0.0) is is_clear
 
 
 def test_a_command_after_which_the_robot_cannot_stop_before_a_wall_is_none():
@@ -100,8 +111,8 @@ def test_a_command_after_which_the_robot_cannot_stop_before_a_wall_is_none():
     body, far = Body(10.0, 2.0, 0.05), [9.0, 9.0, 0.0, 0.0]
     for wall_x_m, stops in ((0.5, True), (0.4, False)):
         wall = Standing(np.array([[0, 254]], np.uint8), wall_x_m - 1.0, -0.5, 1.0, 253)
-        found = needed([1.0, 0.0], far, (1.0, 0.0), standing=wall, body=body)
-        assert bool(found == math.inf) is stops
+        found = overlap([1.0, 0.0], far, (1.0, 0.0), standing=wall, body=body)
+        assert bool(found == 0.0) is stops
 
 
 @pytest.mark.parametrize("speed_mps, stops", [(0.5, True), (1.0, False)])
@@ -109,8 +120,8 @@ def test_a_robot_that_flies_keeps_off_what_stands(speed_mps, stops):
     """The limit is 253 exp(-v): 153 at 0.5 m/s and 93 at 1 m/s; the cells ahead cost 100."""
     body, far = Body(10.0, 2.0, 0.05), [9.0, 9.0, 0.0, 0.0]
     wall = Standing(np.array([[0, 100]], np.uint8), -0.9, -0.5, 1.0, 253, 1.0)
-    found = needed([speed_mps, 0.0], far, (speed_mps, 0.0), standing=wall, body=body)
-    assert bool(found == math.inf) is stops
+    found = overlap([speed_mps, 0.0], far, (speed_mps, 0.0), standing=wall, body=body)
+    assert bool(found == 0.0) is stops
 
 
 def test_nothing_that_moves_leaves_the_command_as_it_is():

@@ -21,7 +21,7 @@ PUBLIC = {
     "fit_disc",
     "predict_states",
     "update_state",
-    "needed_accelerations",
+    "overlaps",
 }
 
 
