@@ -88,7 +88,7 @@ class ObstacleItems:
 
 def moving_solids(scene: Scene, poses: Any) -> List[Obstacle]:
     """Return the moving obstacles at poses float[m, 3]; those with NaN are left out."""
-    known = np.isfinite(np.asarray(poses, np.float64)).all(axis=1)
+    known: Any = np.isfinite(np.asarray(poses, np.float64)).all(axis=1)
     return [shape.placed(pose) for shape, pose, at in zip(scene.moving_shapes, poses, known) if at]
 
 
