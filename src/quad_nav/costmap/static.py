@@ -276,8 +276,10 @@ class StaticLayer(GridLayer):
 
 def _centres(spec: GridSpec, window: Window) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return world x, float64[1, n], and y, float64[m, 1], of a window's cell centres."""
-    x = spec.origin_x_m + (np.arange(window.x0, window.xn) + 0.5) * spec.resolution_m
-    y = spec.origin_y_m + (np.arange(window.y0, window.yn) + 0.5) * spec.resolution_m
+    columns = np.arange(window.x0, window.xn, dtype=np.float64)
+    rows = np.arange(window.y0, window.yn, dtype=np.float64)
+    x = spec.origin_x_m + (columns + 0.5) * spec.resolution_m
+    y = spec.origin_y_m + (rows + 0.5) * spec.resolution_m
     return x[None, :], y[:, None]
 
 

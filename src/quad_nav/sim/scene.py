@@ -194,4 +194,4 @@ class _Alike:
         """Return the obstacles that are up to ``margin_m`` further away than the nearest one."""
         distances_m = self._distances_m(x_m, y_m, z_m)
         rows = np.flatnonzero(distances_m <= distances_m.min() + margin_m + 1e-9)
-        return [self._obstacles[row] for row in rows]
+        return [self._obstacles[row] for row in rows.tolist()]

@@ -24,7 +24,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
-from typing import List, Tuple
+from typing import Any, List, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,7 +162,7 @@ def people_of(
     """
     free_m = walkers.radius_m + FREE_M
     rows, columns = np.nonzero(ground.distances > free_m)
-    free = np.column_stack([columns, rows]) * ground.cell_m + (ground.low_x, ground.low_y)
+    free: Any = np.column_stack([columns, rows]) * ground.cell_m + (ground.low_x, ground.low_y)
     if len(free) == 0:
         raise InputError([f"scene {scene.name}: walkers: there is no free place for a person"])
     starts: List[Floats] = []

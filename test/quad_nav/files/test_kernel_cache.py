@@ -44,6 +44,8 @@ def package(tmp_path, monkeypatch) -> Path:
     sources.mkdir(parents=True)
     (sources / "caller.py").write_text(CALLER)
     (sources / "callee.py").write_text(CALLEE.format(factor=2, more=1))
+    # Byte code of a source that changes within a second, and not in size, would be used again.
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
     monkeypatch.setattr(kernel_cache, "SOURCES", tmp_path / "src")
     monkeypatch.setattr(kernel_cache, "FOLDER", tmp_path / "cache")
     return sources
