@@ -185,7 +185,8 @@ def used(port: int) -> Dict[str, Tuple[float, float]]:
 
     Worker processes of a node have its name with a number; the fork server is left out.
     """
-    figures, names, parents = {}, {}, {}
+    names: Dict[int, str] = {}
+    figures, parents = {}, {}
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             words = (folder / "cmdline").read_bytes().decode().split("\0")

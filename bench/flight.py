@@ -74,8 +74,8 @@ def shares(setup: FlightSetup) -> Dict[str, float]:
     total_s = stats.total_tt  # type: ignore[attr-defined]
     times_s = {
         f"{file.rsplit('/', 1)[-1]}:{name}": entry[3]
-        for (file, _, name), entry in stats.stats.items()
-    }  # type: ignore[attr-defined]
+        for (file, _, name), entry in stats.stats.items()  # type: ignore[attr-defined]
+    }
     return {
         part: sum(times_s.get(place, 0.0) for place in places) / total_s
         for part, places in PARTS.items()
@@ -105,6 +105,7 @@ class Measured:
         begin_cpu_s = cpu_time_s()
         summary = fly(self.setup, processes=processes)
         self.per_cpu.append(summary.sim_time_s / (cpu_time_s() - begin_cpu_s))
+        assert summary.real_time_factor is not None
         self.factors.append(summary.real_time_factor)
 
 
