@@ -46,17 +46,6 @@ USUAL = (
     "16in24",
 )
 LOOPS = {"corridor_to_and_fro": "corridor"}  # goals that share a scene with others
-HEADER = [
-    "encounter",
-    "flights",
-    "complete",
-    "goals\nreached",
-    "per robot,\nmin : max",
-    "flights with\ncontacts",
-    "min separation\nm",
-    "mean time\ns",
-    "max time\ns",
-]
 
 
 @dataclass(frozen=True)
@@ -147,20 +136,20 @@ def figures(encounter: str, setup: FlightSetup, summary: MissionSummary) -> Enco
     )
 
 
-def row(encounter: str, flights: Sequence[EncounterResult]) -> List[str]:
+def row(encounter: str, flights: Sequence[EncounterResult]) -> Dict[str, str]:
     times_s, goals = [one.time_s for one in flights], sum(one.goals for one in flights)
     reached = [one.reached for one in flights]
-    return [
-        encounter,
-        str(len(flights)),
-        str(sum(not one.faults for one in flights)),
-        f"{100 * sum(map(sum, reached)) / goals:.1f} %",
-        f"{min(map(min, reached))} : {max(map(max, reached))}",
-        str(sum(bool(one.contacts) for one in flights)),
-        f"{min(one.gap_m for one in flights):.2f}",
-        f"{sum(times_s) / len(times_s):.1f}",
-        f"{max(times_s):.1f}",
-    ]
+    return {
+        "encounter": encounter,
+        "flights": str(len(flights)),
+        "complete": str(sum(not one.faults for one in flights)),
+        "goals\nreached": f"{100 * sum(map(sum, reached)) / goals:.1f} %",
+        "per robot,\nmin : max": f"{min(map(min, reached))} : {max(map(max, reached))}",
+        "flights with\ncontacts": str(sum(bool(one.contacts) for one in flights)),
+        "min separation\nm": f"{min(one.gap_m for one in flights):.2f}",
+        "mean time\ns": f"{sum(times_s) / len(times_s):.1f}",
+        "max time\ns": f"{max(times_s):.1f}",
+    }
 
 
 def parameter(text: str) -> Tuple[str, Any]:
@@ -175,11 +164,7 @@ def parameter(text: str) -> Tuple[str, Any]:
 @click.option("--config", default="default", show_default=True)
 @click.option("--seeds", default=20, show_default=True, help="Flights of each encounter.")
 @click.option("--first-seed", default=0, show_default=True)
-@click.option(
-    "--jobs",
-    default=lambda: LocalWorkers().count,
-    help="Flights at the same time. [default: one per core]",
-)
+@click.option("--jobs", default=LocalWorkers().count, help="Flights at the same time.")
 @click.option("--set", "parameters", multiple=True, help="PATH=VALUE on top of it.")
 def main(
     encounters: Sequence[str],
@@ -208,11 +193,8 @@ def main(
     print(f"Encounters offline, config {config}, seeds {first_seed} to {first_seed + seeds - 1}")
     if parameters:
         print(*parameters, sep=", ")
-    print(
-        tabulate.tabulate(
-            rows, HEADER, disable_numparse=True, colalign=("left",) + ("right",) * (len(HEADER) - 1)
-        )
-    )
+    align = ("left", *["right"] * (len(rows[0]) - 1))
+    print(tabulate.tabulate(rows, "keys", disable_numparse=True, colalign=align))
     sys.exit(any(one.contacts for one in flights))
 
 

@@ -22,7 +22,7 @@ import platform
 import statistics
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, Dict, List, Optional, Sequence, Tuple
@@ -116,16 +116,7 @@ class Figures:
         facts["scripts"][self.script] = {
             "load_average": self.load_average,
             "figures": [
-                {
-                    "name": one.name,
-                    "unit": one.unit,
-                    "better": one.better,
-                    "repetitions": len(one.values),
-                    "median": one.median,
-                    "spread": one.spread,
-                    "values": one.values,
-                }
-                for one in self.figures
+                {**asdict(one), "median": one.median, "spread": one.spread} for one in self.figures
             ],
         }
         file.write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")

@@ -18,6 +18,7 @@ import signal
 import socket
 import subprocess
 import time
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Tuple
 
@@ -32,16 +33,15 @@ PARTS = 4  # of the measured time
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--robots", type=int, nargs="+", default=[2, 4, 8, 16, 20, 32, 50])
-    parser.add_argument("--hosts", type=int, help="default of fleet.launch if not given")
     parser.add_argument("--seconds", type=float, default=20.0, help="simulated time for each size")
     parser.add_argument("--json", type=Path, help=JSON_HELP)
     parser.add_argument("arguments", nargs="*", help="further arguments of the launch file")
     given = parser.parse_args()
     for robots in given.robots:
-        context = multiprocessing.get_context("spawn")
-        one = context.Process(target=measure, args=(robots, given))
-        one.start()
-        one.join()
+        arguments = f"robots:={robots}", *given.arguments
+        seen = snapshots(robots, given.seconds, "fleet.launch", *arguments)
+        show(robots, seen[0], seen[-1])
+        write(robots, seen, given.json)
 
 
 class Snapshot(NamedTuple):
@@ -53,17 +53,14 @@ class Snapshot(NamedTuple):
     nodes: Dict[str, Tuple[float, float]]  # CPU in s, memory in MB
 
 
-def measure(robots: int, given: argparse.Namespace) -> None:
-    """Measure one size, print its line and add its figures to the file."""
-    hosts = [f"hosts:={given.hosts}"] if given.hosts else []
-    arguments = f"robots:={robots}", *hosts, *given.arguments
-    seen = snapshots(robots, given.seconds, "fleet.launch", *arguments)
-    show(robots, seen[0], seen[-1])
-    write(robots, seen, given.json)
-
-
 def snapshots(robots: int, seconds: float, *arguments: str) -> List[Snapshot]:
     """Start a launch file of ours; return what its nodes have used at the ends of equal parts."""
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        return pool.submit(observe, robots, seconds, *arguments).result()
+
+
+def observe(robots: int, seconds: float, *arguments: str) -> List[Snapshot]:
+    """Take the snapshots; in a process of its own, because a process can be a node once."""
     port = free_port()
     launch = start(port, *arguments)
     try:
@@ -145,11 +142,12 @@ class Clock:
     """The simulation's clock."""
 
     def __init__(self, give_up_s: float) -> None:
+        import rosgraph
         import rospy
         from rosgraph_msgs.msg import Clock as ClockMessage
 
         self.now_s, self._give_up_s = 0.0, give_up_s
-        self._wait(lambda: is_listening(int(os.environ["ROS_MASTER_URI"].rsplit(":", 1)[1])))
+        self._wait(rosgraph.is_master_online)
         rospy.init_node("bench", disable_signals=True, disable_rosout=True)
         rospy.Subscriber("/clock", ClockMessage, self._store, queue_size=1)
 
@@ -187,7 +185,8 @@ def used(port: int) -> Dict[str, Tuple[float, float]]:
 
     Worker processes of a node have its name with a number; the fork server is left out.
     """
-    figures, names, parents = {}, {}, {}
+    names: Dict[int, str] = {}
+    figures, parents = {}, {}
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             words = (folder / "cmdline").read_bytes().decode().split("\0")
@@ -207,11 +206,6 @@ def used(port: int) -> Dict[str, Tuple[float, float]]:
     for number, pid in enumerate((pid for pid in workers if pid not in names), 1):
         found[f"{names[parents[parents[pid]]]} worker {number}"] = figures[pid]
     return found
-
-
-def is_listening(port: int) -> bool:
-    with socket.socket() as probe:
-        return probe.connect_ex(("localhost", port)) == 0
 
 
 def free_port() -> int:

@@ -63,8 +63,7 @@ def setup_of(robots: int, config: str) -> FlightSetup:
 
 def cpu_time_s() -> float:
     """CPU time of this process and of its ended children."""
-    times = os.times()
-    return times.user + times.system + times.children_user + times.children_system
+    return sum(os.times()[:4])
 
 
 def shares(setup: FlightSetup) -> Dict[str, float]:
@@ -75,8 +74,8 @@ def shares(setup: FlightSetup) -> Dict[str, float]:
     total_s = stats.total_tt  # type: ignore[attr-defined]
     times_s = {
         f"{file.rsplit('/', 1)[-1]}:{name}": entry[3]
-        for (file, _, name), entry in stats.stats.items()
-    }  # type: ignore[attr-defined]
+        for (file, _, name), entry in stats.stats.items()  # type: ignore[attr-defined]
+    }
     return {
         part: sum(times_s.get(place, 0.0) for place in places) / total_s
         for part, places in PARTS.items()
@@ -106,6 +105,7 @@ class Measured:
         begin_cpu_s = cpu_time_s()
         summary = fly(self.setup, processes=processes)
         self.per_cpu.append(summary.sim_time_s / (cpu_time_s() - begin_cpu_s))
+        assert summary.real_time_factor is not None
         self.factors.append(summary.real_time_factor)
 
 
@@ -120,7 +120,7 @@ def missions(config: str, robots: Tuple[int, ...]) -> Dict[int, Measured]:
     return found
 
 
-def row(count: int, one: Measured, config: str, figures: Figures) -> List[str]:
+def row(count: int, one: Measured, config: str, figures: Figures) -> Dict[str, str]:
     """Add a mission's figures; return its row."""
     case = f"{count} robots, {config}"
     factor = figures.add(f"real-time factor, {case}", "", one.factors, LARGER)
@@ -129,26 +129,24 @@ def row(count: int, one: Measured, config: str, figures: Figures) -> List[str]:
         f"CPU per robot and second, {case}", "ms", [1e3 / count / each for each in one.per_cpu]
     )
     parts = shares(replace(one.setup, time_limit_s=min(one.setup.time_limit_s, 20.0)))
-    return [
-        str(count),
-        str(processes_for(count)),
-        f"{factor:.1f}",
-        f"{spread:.1f}",
-        f"{one.wanted:g}",
-        f"{one.beyond:g}",
-        f"{cost_ms:.2f}",
-        *(f"{100 * part:.0f}" for part in parts.values()),
-    ]
+    return {
+        "robots": str(count),
+        "processes": str(processes_for(count)),
+        "real-time\nfactor": f"{factor:.1f}",
+        "spread": f"{spread:.1f}",
+        "required": f"{one.wanted:g}",
+        "swarm\nsimulator": f"{one.beyond:g}",
+        "CPU per\nrobot, ms/s": f"{cost_ms:.2f}",
+        **{
+            f"{part}\n%".replace(" ", "\n", 1): f"{100 * share:.0f}"
+            for part, share in parts.items()
+        },
+    }
 
 
 @click.command()
 @click.option("--config", default="tutorial", show_default=True)
-@click.option(
-    "--robots",
-    type=int,
-    multiple=True,
-    help="Fly only the mission with so many robots; repeatable.",
-)
+@click.option("--robots", type=int, multiple=True, help="Only the mission of so many robots.")
 @click.option("--repeat", type=click.IntRange(min=1), default=3, show_default=True)
 @click.option("--json", "file", type=click.Path(path_type=Path), help=JSON_HELP)
 def main(config: str, robots: Tuple[int, ...], repeat: int, file: Optional[Path]) -> None:
@@ -161,21 +159,11 @@ def main(config: str, robots: Tuple[int, ...], repeat: int, file: Optional[Path]
     memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     figures.add(f"memory of one process, {config}", "MB", [memory_mb])
     rows = [row(count, one, config, figures) for count, one in measured.items()]
-    header = [
-        "robots",
-        "processes",
-        "real-time\nfactor",
-        "spread",
-        "required",
-        "swarm\nsimulator",
-        "CPU per\nrobot, ms/s",
-        *(f"{part}\n%".replace(" ", "\n", 1) for part in PARTS),
-    ]
     print(
         f"Flights offline, config {config}, medians of {repeat}; the percentages under a profiler,"
         f"\nin one process. Memory at most {memory_mb:.0f} MB"
     )
-    print(tabulate.tabulate(rows, header, disable_numparse=True, stralign="right"))
+    print(tabulate.tabulate(rows, "keys", disable_numparse=True, stralign="right"))
     figures.write(file)
 
 

@@ -25,10 +25,11 @@ from quad_nav.control.controller import LocalPlanner
 from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
 from quad_nav.control.trajectory_planner import TrajectoryPlanner
 from quad_nav.costmap.layered import LayeredCostmap
-from quad_nav.geometry import Pose2D, Pose3D, Twist2D
+from quad_nav.costmap.obstacle import ObstacleLayer
+from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.scenario.assembly import build_navigator
-from quad_nav.sim.lidar import Scan, base_from_lidar
+from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.sim.simulation import Simulation
 from quad_nav.sim.simulation_params import STEPS_PER_S
@@ -88,7 +89,9 @@ class Updates:
             scan, map_from_base = self.seen[self.taken % len(self.seen)]
             self.now_s, self.pose = self.taken / SCAN_HZ, map_from_base.to_2d()
             map_from_sensor = map_from_base.compose(base_from_lidar)
-            self.costmap.layers["obstacle_layer"].add_scan(
+            layer = self.costmap.layers["obstacle_layer"]
+            assert isinstance(layer, ObstacleLayer)
+            layer.add_scan(
                 "base_scan", replace(scan, stamp_s=self.now_s), map_from_sensor, self.now_s
             )
             self.taken += 1

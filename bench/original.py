@@ -10,12 +10,10 @@ Without C++ move_base the other two are measured, and the status is 0 as well.
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import statistics
 import sys
 import tempfile
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Dict, List, Optional
 
@@ -107,9 +105,7 @@ def main(workspace: Optional[Path], config: str, repeat: int, seconds: float) ->
         costs_ms: Dict[str, List[float]] = {navigator: [] for navigator in arguments}
         for navigator, own in [*arguments.items()] * repeat:
             launched = "two_quads.launch", "loop:=true", f"config:={config}", *own
-            spawn = multiprocessing.get_context("spawn")
-            with ProcessPoolExecutor(1, spawn) as pool:  # a process can be a node once
-                seen = pool.submit(snapshots, ROBOTS, seconds, *launched).result()
+            seen = snapshots(ROBOTS, seconds, *launched)
             rows.append(row(navigator, seen))
             costs_ms[navigator].append(cost_ms(seen))
             print(*rows[-1], sep=", ", file=sys.stderr, flush=True)

@@ -46,16 +46,8 @@ def flights(barn: Optional[Path]) -> Dict[str, List[str]]:
         scene = ROOT / "scenes" / "encounters" / f"{folder.name}.yaml"
         if scene.exists():
             for seed in (1, 2):
-                listed[f"{folder.name} seed {seed}"] = [
-                    "fly",
-                    "--scene",
-                    str(scene),
-                    "--goals",
-                    str(folder),
-                    "--seed",
-                    str(seed),
-                    *usual,
-                ]
+                own = ["--scene", str(scene), "--goals", str(folder), "--seed", str(seed)]
+                listed[f"{folder.name} seed {seed}"] = ["fly", *own, *usual]
     listed["12 robots seed 5"] = ["fly", "--robots", "12", "--seed", "5"]
     if barn is not None:
         listed["barn"] = ["barn", "--worlds", str(barn), "--only", BARN_WORLDS, "--workers", "1"]
@@ -94,7 +86,7 @@ def differences(before: Any, after: Any, place: str = "") -> Iterator[str]:
         yield f"{place}: {before} before, {after} now"
 
 
-def fly_all(barn: Optional[Path], source: Path, jobs: int, only: str = "") -> Dict[str, Summary]:
+def fly_all(barn: Optional[Path], source: Path, jobs: int, only: str) -> Dict[str, Summary]:
     """Fly the whole list; exit with status 2 if one of them could not be flown."""
     tasks = {name: arguments for name, arguments in flights(barn).items() if only in name}
     summaries: Dict[str, Summary] = {}
@@ -109,47 +101,25 @@ def fly_all(barn: Optional[Path], source: Path, jobs: int, only: str = "") -> Di
     return {name: summaries[name] for name in tasks}
 
 
-@click.group()
-def main() -> None:
-    """Record a list of flights, or compare today's with recorded ones."""
-
-
 _FILE = click.Path(dir_okay=False, path_type=Path)
-_OPTIONS = (
-    click.argument("file", type=_FILE),
-    click.option(
-        "--source",
-        type=click.Path(file_okay=False, path_type=Path),
-        default=ROOT,
-        help="The checkout whose sources fly.  [default: this one]",
-    ),
-    click.option("--barn", type=_FILE, help="The file of the BARN worlds."),
-    click.option("--jobs", type=int, default=joblib.cpu_count(), help="Flights at the same time."),
-)
+_FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
-def _with_options(command: Any) -> Any:
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
-
-
-@main.command()
-@_with_options
-def record(file: Path, source: Path, barn: Optional[Path], jobs: int) -> None:
-    """Fly and write the summaries to FILE."""
-    summaries = fly_all(barn, source, jobs)
-    file.write_text(json.dumps(summaries, indent=1), encoding="utf-8")
-    print(f"{len(summaries)} flights recorded")
-
-
-@main.command()
-@_with_options
+@click.command()
+@click.argument("action", type=click.Choice(["record", "compare"]))
+@click.argument("file", type=_FILE)
+@click.option("--source", type=_FOLDER, default=ROOT, help="The checkout whose sources fly.")
+@click.option("--barn", type=_FILE, help="The file of the BARN worlds.")
+@click.option("--jobs", type=int, default=joblib.cpu_count(), help="Flights at the same time.")
 @click.option("--only", default="", metavar="TEXT", help="Flights with this text in their name.")
-def compare(file: Path, source: Path, barn: Optional[Path], jobs: int, only: str) -> None:
-    """Fly and compare with the summaries in FILE."""
-    recorded = json.loads(file.read_text(encoding="utf-8"))
+def main(action: str, file: Path, source: Path, barn: Optional[Path], jobs: int, only: str) -> None:
+    """Record a list of flights in FILE, or compare today's with those in FILE."""
+    recorded = json.loads(file.read_text(encoding="utf-8")) if action == "compare" else {}
     flown = fly_all(barn, source, jobs, only)
+    if action == "record":
+        file.write_text(json.dumps(flown, indent=1), encoding="utf-8")
+        print(f"{len(flown)} flights recorded")
+        return
     lines = [
         f"{name}{line}" for name in flown for line in differences(recorded.get(name), flown[name])
     ]
