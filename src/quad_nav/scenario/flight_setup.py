@@ -114,6 +114,7 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         raise InputError(problems + ([] if given_goals else _missing_goals(options, problems)))
     assert scene is not None
     longest_s = max(1.0 / one.navigator.controller_frequency_hz for one in configurations)
+    told = (*scene.remarks, *unseen_obstacles(scene), *scenario.notes, *scenario.warnings)
     warnings = dict.fromkeys(line for one in configurations for line in one.warnings)
     return FlightSetup(
         scene,
@@ -124,13 +125,7 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         steps_per_scan(options.scans_per_s),
         options.seed,
         options.time_limit_s,
-        warnings=(
-            *scene.remarks,
-            *unseen_obstacles(scene),
-            *scenario.notes,
-            *scenario.warnings,
-            *warnings,
-        ),
+        warnings=(*told, *warnings),
     )
 
 
