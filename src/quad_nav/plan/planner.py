@@ -60,7 +60,7 @@ def plan_near(
         return planner.make_plan(spec, costs, start, goal), False
     except PlanningError as error:
         unreachable = error
-    reach_m = min(tolerance_m, _farthest_m(spec, goal))
+    reach_m = min(_farthest_m(spec, goal), tolerance_m)  # NaN for a goal that is none
     for dx, dy in ring_offsets(spec.resolution_m, tolerance_m, reach_m):
         near = Pose2D(goal.x_m + dx, goal.y_m + dy, goal.yaw_rad)
         try:
