@@ -75,5 +75,5 @@ def test_a_study_without_optuna_says_how_to_get_it(command):
     assert (refused.returncode, refused.stderr) == (
         1,
         f"Error: quad {command}: optuna is not installed; "
-        "expected it from pip install 'quad-nav[tune]'\n",
+        "expected it from pip install 'quad-nav[tune]', or in a checkout from make venv\n",
     )

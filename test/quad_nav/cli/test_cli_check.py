@@ -60,11 +60,11 @@ def test_shipped_configurations_have_no_errors():
 
 
 def test_the_four_files_are_one_set_in_the_launch_files_order(tmp_path):
-    write(tmp_path, {**STANDARD, "move_base_params.yaml": "", "dwa_params.yaml": "DWAPlannerROS:"})
+    write(tmp_path, {**STANDARD, "move_base_params.yaml": "", "amcl_params.yaml": "kld_err: 0.1"})
     (one,), left = file_sets(tmp_path)
     assert [file.path.name for file in one.files] == [*STANDARD, "move_base_params.yaml"]
     assert one.files[0].namespaces == ("global_costmap", "local_costmap")
-    assert left == [tmp_path / "dwa_params.yaml"]
+    assert left == [tmp_path / "amcl_params.yaml"]
 
 
 def test_every_robot_with_files_of_its_own(tmp_path):
@@ -210,7 +210,7 @@ def test_table(tmp_path, monkeypatch):
     assert (
         output.rstrip()
         == """\
-.: no errors, 4 warnings
+.: no errors, 5 warnings
   costmap_common_params.yaml, local_costmap_params.yaml, global_costmap_params.yaml,
   base_local_planner_params.yaml, move_base_params.yaml
 
@@ -223,7 +223,9 @@ TrajectoryPlannerROS/pdist_scale    renamed  old name of path_distance_bias
 TrajectoryPlannerROS/max_vel_x      clamped  25 clamped to 20.0, the largest that move_base allows
   base_local_planner_params.yaml:3
 *_costmap/zzz                       unknown  nothing reads it
-  costmap_common_params.yaml:4"""
+  costmap_common_params.yaml:4
+controller_frequency                caution  a command is flown for 0.05 s, which is 1.0 m; the
+                                             local costmap reaches 1.5 m"""
     )
 
 

@@ -57,7 +57,10 @@ def test_every_file_with_a_fault_is_named(folder, tmp_path, capsys, monkeypatch)
     errors = capsys.readouterr().err.splitlines()
     assert errors[0] == "quad0: invalid configuration:"
     assert len(errors) == 4
-    assert errors[2] == f"  {folder}/move_base_params.yaml:1: unknown $(arg j); expected $(arg i)"
+    assert errors[2] == (
+        f"  {folder}/move_base_params.yaml:1: unknown $(arg j); expected $(arg i), "
+        "or a value: add :j=VALUE after the name of the folder"
+    )
     monkeypatch.setenv(COLLECT, "1")
     assert [f"  {line}" for line in printed(capsys, *arguments)[FAULTS]] == errors[1:]
 
