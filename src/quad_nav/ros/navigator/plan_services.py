@@ -20,6 +20,7 @@ from quad_nav.geometry import Pose2D
 from quad_nav.navigator.tick import RobotPoses, State
 from quad_nav.plan.carrot import Carrot
 from quad_nav.ros.common.conversions import pose_from_message
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.nav_messages import goal_from_message, path_message
 from quad_nav.ros.common.rospy_repairs import refuse_without_text
 from quad_nav.ros.navigator.plan_topics import PlanTopics
@@ -46,6 +47,7 @@ class PlanServices:
         self._host, self._navigator = host, host.navigator
         self._topics, self._lock, self._locate, self._names = topics, lock, locate, names
         self._frame = host.navigator.global_costmap.params.global_frame
+        self._warnings = ThrottledWarnings()
         self._services = [
             rospy.Service(names("~make_plan"), GetPlan, self._make_plan),
             rospy.Service(names("~clear_costmaps"), Empty, self._clear_costmaps),
@@ -96,7 +98,7 @@ class PlanServices:
 
     def _refusal(self, reason: str) -> rospy.ServiceException:
         """Return the error that a client gets; the original says nothing."""
-        rospy.logerr("%s: refused: %s", self._make_plan_name, reason)
+        self._warnings.error(f"{self._make_plan_name}: refused: {reason}")
         explains = self._navigator.params.check_goals
         return rospy.ServiceException(reason if explains else "")
 
@@ -119,7 +121,7 @@ class PlanServices:
                 )
             plan, is_near = self._navigator.plan_near(start, goal, tolerance_m)
         except (InvalidGoal, PlanningError) as error:
-            rospy.logwarn("%s: no plan: %s", name, error)
+            self._warnings.warn(f"{name}: no plan: {error}", f"{name}: {type(error).__name__}")
             if isinstance(error, NoPath):
                 self._topics.publish_no_plan(now)
             return [], False
