@@ -57,9 +57,6 @@ SPEEDS, COURSES = 6, 32
 """The polar grid of commands: 0.33 m/s and 11 degrees apart at 2 m/s."""
 HOLD_PERIODS = 1.5
 """A command acts until the next one, and odometry is half a period old on average."""
-DELAY_S = 0.1
-"""The last command acts for a control period before the next one does: what stands is nearer by as
-much as the robot flies meanwhile. Costs beyond the inscribed radius decay with the distance."""
 AT_POINT_M = 0.15
 """A robot that hovers returns to its point from farther away, about the tolerance of a goal."""
 RETURN_GAIN_PER_S = 1.0
@@ -222,12 +219,16 @@ def polar_grid(max_speed_mps: float) -> Floats:
 
 
 def standing_of(situation: Situation) -> Standing:
-    """Return what stands."""
+    """Return what stands.
+
+    The last command acts for one control period more. What the robot flies meanwhile is missing to
+    what stands; costs beyond the inscribed radius decay with the distance.
+    """
     spec, costs, pose = situation.costmap.spec, situation.costmap.costs, situation.pose
     left_m, low_m = spec.origin_x_m - pose.x_m, spec.origin_y_m - pose.y_m
     layers = situation.costmap.layers.values()
     decays = [one.params.cost_scaling_factor for one in layers if isinstance(one, InflationLayer)]
-    decay_s_per_m = DELAY_S * max(decays, default=0.0)
+    decay_s_per_m = situation.period_s * max(decays, default=0.0)
     return Standing(costs, left_m, low_m, spec.resolution_m, INSCRIBED, decay_s_per_m)
 
 

@@ -1,4 +1,4 @@
-"""How far obstacles can reach into a robot, for each of many commands.
+"""How deep a robot is in what obstacles can reach, for each of many commands.
 
 ``evasion`` has the reasoning. Velocities are float64[2] along the axes of the local costmap's frame
 in m/s, places are relative to the robot in metres, times are multiples of a step.
@@ -65,7 +65,7 @@ def overlaps(
     commands: NDArray[np.float64],
     found: NDArray[np.float64],
 ) -> None:
-    """Add up how deep what obstacles can reach lies in the robot, for each command.
+    """Add up how deep the robot is in what obstacles can reach, for each command.
 
     After a time t an obstacle is within a t^2 / 2 of where its velocity leads it, with the greatest
     acceleration a, and within the way of its greatest speed. The greatest depth until then is added

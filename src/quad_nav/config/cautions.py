@@ -42,7 +42,7 @@ def _costmap_cautions(costmaps: Mapping[str, CostmapParams]) -> Iterator[Caution
                 if radius_m < inscribed_m - _ROUNDING_M:
                     yield (
                         f"{name}/{layer}/inflation_radius",
-                        f"{radius_m:g} m is below the inscribed radius of {inscribed_m:g} m: "
+                        f"{radius_m:g} m is below the inscribed radius of {inscribed_m:.2f} m: "
                         "plans lead where the robot does not fit",
                     )
         if not _has(costmap, StaticLayerParams, PluginLayerParams) and not _sees(costmap):

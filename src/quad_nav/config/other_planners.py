@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from typing import Any, Dict, List, Mapping
 
-_NUMBERS = (int, float)
-# DWAPlannerROS's name -> the others' names, the first of which is there counts.
+# DWAPlannerROS's name -> names of others, of which the first that is given counts.
 _NAMES = {
     "max_vel_x": ("max_vel_x", "max_vel_lin", "max_vel_trans", "desired_linear_vel"),
     "max_vel_y": ("max_vel_y",),
@@ -55,4 +54,4 @@ def footprint_of(others: Mapping[str, Any]) -> Dict[str, Any]:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, _NUMBERS) and not isinstance(value, bool)
+    return isinstance(value, (int, float)) and not isinstance(value, bool)

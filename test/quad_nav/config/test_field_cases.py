@@ -161,7 +161,7 @@ def cautions_of(source):
 @pytest.mark.parametrize(
     "case, caution",
     [
-        ("inflation_small/cfg", "0.2 m is below the inscribed radius of 0.4 m"),
+        ("inflation_small/cfg", "0.2 m is below the inscribed radius of 0.40 m"),
         ("slow_control/cfg", "a command is flown for 10 s, which is 3.0 m"),
     ],
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +17,6 @@ from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
 from quad_nav.navigator.tick import RobotPoses, State, Trigger
 from quad_nav.peers.coordinator import PeerCoordinator
-from quad_nav.plan.planner import plan_near, ring_offsets
 from quad_nav.recovery import Step
 
 HERE = Pose2D(1.0, 1.0, 0.0)
@@ -264,34 +262,6 @@ def test_local_from_global_transforms_the_global_pose_to_the_local_one():
     # Turned by -90 degrees: (2, 1) becomes (1, -2); (0, 3) - (1, -2) = (-1, 5).
     assert (transform.x_m, transform.y_m) == pytest.approx((-1.0, 5.0))
     assert transform.yaw_rad == pytest.approx(-np.pi / 2)
-
-
-def test_rings_around_a_goal():
-    first = list(ring_offsets(0.25, 0.75, 0.75))
-    # The axis points once each, the corners with both signs: 8 points of one ring.
-    assert len(first) == len(set(first)) == 8
-    assert set(first) == {(x, y) for x in (-0.75, 0, 0.75) for y in (-0.75, 0, 0.75)} - {(0, 0)}
-
-
-def test_rings_are_summed_in_single_precision():
-    third, tenth = float(np.float32(0.3)), float(np.float32(0.1))
-    two = list(ring_offsets(0.05, third, third))
-    assert two[0] == (-0.15000000596046448, 0.0)
-    assert two[8] == (-0.30000001192092896, 0.0)
-    assert len(two) == 8 + 16
-    assert list(ring_offsets(0.05, tenth, tenth))[0] == (-tenth, 0.0)
-    assert list(ring_offsets(0.05, third, tenth)) == []
-    assert list(ring_offsets(0.05, math.inf, math.nan)) == []
-
-
-@pytest.mark.parametrize("place", [Pose2D(2.0, 2.0), Pose2D(50.0, 2.0), Pose2D(math.nan, 2.0)])
-def test_a_search_without_end_stops_at_the_map(place):
-    class Nowhere:
-        def make_plan(self, *_):
-            raise NoPath("nowhere")
-
-    with pytest.raises(NoPath):
-        plan_near(Nowhere(), GridSpec(9, 9, 0.5), np.zeros((9, 9)), GOAL, place, math.inf)
 
 
 def test_shutdown_costmaps_skips_updates_without_a_goal():

@@ -84,7 +84,7 @@ class OwnTopics:
 
     @property
     def is_due(self) -> bool:
-        """Whether the next `check` does anything."""
+        """Whether `check` has something to do now."""
         return time.monotonic() >= self._next_check_s
 
     def check(self) -> None:
