@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from quad_nav.api.flight import PERIOD_S, Command, Flight, periods
 from quad_nav.geometry import Pose2D
-from quad_nav.loop.flight_loop import STEPS_PER_ODOMETRY
 from quad_nav.mission.actions import Action, GoalEnded
 from quad_nav.mission.goal_file import GoalSequence
 from quad_nav.mission.sequencer import Sequencer
@@ -22,6 +21,7 @@ from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.flight import BodyState
 from quad_nav.sim.simulation import Simulation
+from quad_nav.sim.simulation_params import STEPS_PER_ODOMETRY
 
 Commands = Mapping[int, Optional[Command]]
 

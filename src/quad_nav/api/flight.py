@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from quad_nav.api.result import FlightResult, TrajectoryObserver
 from quad_nav.config import Configuration, updated
 from quad_nav.geometry import Pose2D, Scan, Twist2D
-from quad_nav.loop.flight_loop import STEPS_PER_ODOMETRY
 from quad_nav.navigator.tick import Tick
 from quad_nav.offline import flight as offline
 from quad_nav.offline.run import summary_of
@@ -20,7 +19,7 @@ from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.flight import BodyState
 from quad_nav.sim.robot_state import RobotState
-from quad_nav.sim.simulation_params import STEPS_PER_S
+from quad_nav.sim.simulation_params import STEPS_PER_ODOMETRY, STEPS_PER_S
 
 Command = Twist2D
 """Velocity in ``base_link``: ``Command(vx_mps, vy_mps, vyaw_radps)``."""

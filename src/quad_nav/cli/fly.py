@@ -9,10 +9,9 @@ import click
 
 from quad_nav.cli.options import A_FILE, A_FOLDER, AMOUNT, OUTPUT, POSITIVE, web_options
 
-# Those of quad_nav.sim.simulation, .flight and .odometry; importing them would load the engine.
+# Those of quad_nav.sim.simulation and .flight; importing them would load the engine.
 LIDAR_CASTERS = ("kernel", "bullet")
 AIRFRAMES = ("default", "arducopter")
-MAX_DRIFT = 1.0
 
 
 @click.command()
@@ -106,11 +105,9 @@ MAX_DRIFT = 1.0
 )
 @click.option(
     "--odom-drift",
-    nargs=2,
-    type=click.FloatRange(0.0, MAX_DRIFT),
-    default=(0.0, 0.0),
-    metavar="M/S RAD/S",
-    help="Speeds at which each robot's frame odom{i} drifts and turns in map. [default: none]",
+    default="",
+    metavar="NAME=VALUE,...",
+    help="Errors of the odometry, such as per_m=0.05,per_rad=0.05. [default: none]",
 )
 @click.option(
     "--lidar",

@@ -11,12 +11,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Mapping, Optional, Protocol, Sequence, Tuple
 
+import yaml
+
 from quad_nav.cli import EXIT_INTERRUPTED, add_ons
 from quad_nav.cli.options import echo, echo_lines, exit_on_faults, parameter, show_warnings
 from quad_nav.cli.outputs import Outputs
 from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar, compile_kernels
-from quad_nav.errors import PluginError
+from quad_nav.errors import InputError, PluginError
+from quad_nav.files import plain_yaml
 from quad_nav.files.shipped import shipped
 from quad_nav.loop.worker_process import processes_for
 from quad_nav.mission.flight_log import INTERRUPTED
@@ -27,9 +30,10 @@ from quad_nav.offline.run import fly as fly_setup
 from quad_nav.scenario.flight_facts import offline_facts
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.scenario.goal_plans import unreachable_goals
+from quad_nav.scenario.rules import RULES
 from quad_nav.sim.flight import AIRFRAMES
 from quad_nav.sim.lidar import LidarParams
-from quad_nav.sim.odometry import OdomDrift
+from quad_nav.sim.odometry import OdometryErrors
 from quad_nav.sim.simulation_params import SimulationParams
 
 _TUTORIAL_ROBOTS = 2
@@ -119,7 +123,7 @@ def _options(
     jitter: float,
     lidar: str,
     airframe: str,
-    odom_drift: Tuple[float, float],
+    odom_drift: str,
     **given: Any,
 ) -> FlightOptions:
     """Translate the command line's options."""
@@ -129,9 +133,24 @@ def _options(
         airframe=AIRFRAMES[airframe],
         jitter_m=jitter,
         lidar_caster=lidar,
-        odom_drift=OdomDrift(*odom_drift),
+        odom_drift=_odometry_errors(odom_drift),
     )
     return mission_options(simulation=simulation, **given)
+
+
+def _odometry_errors(text: str) -> OdometryErrors:
+    """Parse "per_m=0.05,per_rad=0.05".
+
+    Raises:
+        InputError: The text has another form, or a value is out of range.
+    """
+    rule = RULES["odom_drift"]
+    values: Any = None
+    with contextlib.suppress(yaml.YAMLError):
+        values = plain_yaml.load("{" + text.replace("=", ": ") + "}")
+    if not rule.accepts(values):
+        raise InputError([f"--odom-drift {text}: expected {rule.expected}, with = for :"])
+    return OdometryErrors.of(values)
 
 
 def mission_options(parameters: Tuple[str, ...], **given: Any) -> FlightOptions:

@@ -25,10 +25,8 @@ from quad_nav.peers.peer import Intention
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.robot_state import RobotStates
 from quad_nav.sim.simulation import Simulation
-from quad_nav.sim.simulation_params import STEPS_PER_S
+from quad_nav.sim.simulation_params import STEPS_PER_ODOMETRY
 from quad_nav.timing import is_due
-
-STEPS_PER_ODOMETRY = STEPS_PER_S // 40
 
 WorkerLoss = Callable[[Tuple[int, ...], WorkerProcessError], None]
 """Receiver of a lost worker process: the numbers of its robots, and the reason."""
@@ -126,7 +124,7 @@ class FlightLoop:
         """States of all robots now; the same object until they move."""
         bodies = self.simulation.body_state
         if self._states is None or self._states.bodies is not bodies:
-            self._states = RobotStates(bodies)
+            self._states = RobotStates(bodies, self.simulation.odom_frames)
         return self._states
 
     # -- time ----------------------------------------------------------------------------
@@ -243,7 +241,7 @@ class FlightLoop:
         before_s = self.now_s
         self.simulation.reset(seed, start_step)
         now_s, seed = self.now_s, self.simulation.seed
-        self.group.reset(now_s, seed, now_s < before_s, self.simulation.lidars)
+        self.group.reset(now_s, now_s < before_s, self.simulation.lidars)
         self._for_each_worker(lambda worker: worker.reset(now_s, seed, now_s < before_s))
 
     def add_worker(self, robots: Sequence[int]) -> None:

@@ -165,11 +165,11 @@ def _view(
         len(navigator.recoveries),
         robot.stopped_reason,
         navigator.peers.safety_radius_m,
-        _placed(robot, robot.plan, global_costmap, now_s) if shows(PLAN) else None,
-        _placed(robot, robot.local_plan, local_costmap, now_s) if shows(LOCAL_PLAN) else None,
+        _placed(robot, robot.plan, global_costmap) if shows(PLAN) else None,
+        _placed(robot, robot.local_plan, local_costmap) if shows(LOCAL_PLAN) else None,
         scan if what.includes(SCAN, number) else None,
         {
-            part: _costmap(robot, costmap, now_s)
+            part: _costmap(robot, costmap)
             for part, costmap in zip((GLOBAL_COSTMAP, LOCAL_COSTMAP), robot.costmaps)
             if what.includes(part, number)
         },
@@ -178,20 +178,20 @@ def _view(
 
 
 def _placed(
-    robot: LoopRobot, plan: Optional[NDArray[np.float64]], costmap: LayeredCostmap, now_s: float
+    robot: LoopRobot, plan: Optional[NDArray[np.float64]], costmap: LayeredCostmap
 ) -> Optional[NDArray[np.float64]]:
     """Return a plan in ``map``, float64[n, 2]."""
     if plan is None or not len(plan):
         return None
-    placed: NDArray[np.float64] = robot.map_from(
-        costmap.params.global_frame, now_s
-    ).transform_points(plan[:, :2])
+    placed: NDArray[np.float64] = robot.map_from(costmap.params.global_frame).transform_points(
+        plan[:, :2]
+    )
     return placed
 
 
-def _costmap(robot: LoopRobot, costmap: LayeredCostmap, now_s: float) -> CostmapView:
+def _costmap(robot: LoopRobot, costmap: LayeredCostmap) -> CostmapView:
     frame = costmap.params.global_frame
-    return CostmapView(costmap.spec, costmap.costs, robot.map_from(frame, now_s))
+    return CostmapView(costmap.spec, costmap.costs, robot.map_from(frame))
 
 
 def _track(robot: LoopRobot, now_s: float) -> Optional[TrackView]:
@@ -199,4 +199,4 @@ def _track(robot: LoopRobot, now_s: float) -> Optional[TrackView]:
     if tracks is None or not tracks.any_may_move:
         return None
     frame = robot.navigator.local_costmap.params.global_frame
-    return TrackView(tracks, robot.map_from(frame, now_s))
+    return TrackView(tracks, robot.map_from(frame))

@@ -30,9 +30,8 @@ from quad_nav.scenario.navigator_host import NavigatorHost
 from quad_nav.scenario.scene_map import SceneMaps
 from quad_nav.sim.casters import Lidars
 from quad_nav.sim.lidar import base_from_lidar
-from quad_nav.sim.odometry import OdomFrames, pose_in
+from quad_nav.sim.odometry import FIXED_FRAMES, pose_in
 from quad_nav.sim.robot_state import RobotState, RobotStates
-from quad_nav.sim.simulation_params import STEPS_PER_S
 from quad_nav.timing import is_due
 
 LocatedScan = Tuple[Scan, Pose3D]
@@ -68,16 +67,15 @@ class LoopRobot(NavigatorHost):
         waiting_goal: The last goal that was sent, in ``map``, until the navigator takes it.
         due_s: Time before which no tick is due, unless a goal waits. Who changes the navigator
             between ticks sets it to -inf.
+        frames: The odometry frames of all robots now.
     """
 
-    def __init__(
-        self, configuration: Configuration, number: int, frames: OdomFrames, start_s: float = 0.0
-    ) -> None:
-        """Build the navigator of robot ``number``; the ``frames`` drift from ``start_s`` on."""
+    def __init__(self, configuration: Configuration, number: int) -> None:
+        """Build the navigator of robot ``number``."""
         super().__init__(configuration, number)
         self.waiting_goal: Optional[Pose2D] = None
         self.due_s = -math.inf
-        self._number, self._frames, self._start_s = number, frames, start_s
+        self._number, self.frames = number, FIXED_FRAMES
         self._lidar = self.new_intake(self.lidar_sinks())
 
     def lidar_sinks(self) -> List[Sink]:
@@ -92,10 +90,10 @@ class LoopRobot(NavigatorHost):
     def add_scan(self, scan: Scan, map_from_lidar: Pose3D, now_s: float) -> str:
         """Hand a scan that arrives now to the costmaps; return why not, "" if they have it."""
         sinks = self._lidar.sinks
-        if self._frames.are_fixed:
+        if self.frames.rows is None:
             poses = [SensorPose(map_from_lidar, map_from_lidar)] * len(sinks)
         else:
-            in_costmaps = self._in_costmaps(map_from_lidar, now_s)
+            in_costmaps = self._in_costmaps(map_from_lidar)
             at = {frame: SensorPose(pose, pose) for frame, pose in in_costmaps.items()}
             poses = [at[sink.costmap.params.global_frame] for sink in sinks]
         return self._lidar.add_scan(scan, poses, scan.stamp_s, now_s)
@@ -103,7 +101,7 @@ class LoopRobot(NavigatorHost):
     def is_due(self, now_s: float) -> bool:
         """Set the waiting goal if the navigator accepts it; return True if a tick is due."""
         if self.waiting_goal is not None and self.navigator.accepts_goal(now_s):
-            goal, map_from_global = self.waiting_goal, self.map_from_global(now_s)
+            goal, map_from_global = self.waiting_goal, self.map_from_global
             if map_from_global != _IDENTITY:
                 goal = goal.relative_to(map_from_global)
             self.navigator.set_goal(goal, now_s)
@@ -121,55 +119,55 @@ class LoopRobot(NavigatorHost):
         for costmap in self.costmaps:
             if costmap.map_frames:
                 costmap.set_map_poses(self._map_poses(costmap, now_s))
-        located = self._located(state.map_from_base, now_s)
-        map_from_global = self.map_from_global(now_s)
+        located = self._located(state.map_from_base)
+        map_from_global = self.map_from_global
         if map_from_global != _IDENTITY:
             peers = [peer.relative_to(map_from_global) for peer in peers]
         tick = self.tick(now_s, located, state.twist, peers)
         self._note_due()
         return tick, located
 
-    def intention(self, now_s: float) -> Intention:
+    def intention(self) -> Intention:
         """Return the navigator's intention in ``map``."""
-        intention, map_from_global = self.navigator.peers.intention, self.map_from_global(now_s)
+        intention, map_from_global = self.navigator.peers.intention, self.map_from_global
         if map_from_global == _IDENTITY:
             return intention
         return intention.transformed(map_from_global)
 
-    def reset(self, frames: OdomFrames, start_s: float, jumped_back: bool) -> None:
-        """Continue with other odometry frames; see ``NavigatorGroup.reset``."""
-        self._frames, self._start_s = frames, start_s
+    def reset(self, now_s: float, jumped_back: bool) -> None:
+        """Continue after a reset; see ``NavigatorGroup.reset``."""
         self.due_s = -math.inf
         if jumped_back:
-            self.restart(start_s)
+            self.restart(now_s)
 
-    def map_from_global(self, now_s: float) -> Pose2D:
-        """Return the pose of the global costmap's frame in ``map``."""
-        return self.map_from(self.navigator.global_costmap.params.global_frame, now_s)
+    @property
+    def map_from_global(self) -> Pose2D:
+        """Pose of the global costmap's frame in ``map``."""
+        return self.map_from(self.navigator.global_costmap.params.global_frame)
 
-    def map_from(self, frame: str, now_s: float) -> Pose2D:
+    def map_from(self, frame: str) -> Pose2D:
         """Return the pose of a costmap's frame in ``map``."""
-        return self._frames.map_from_frame(frame, self._number, now_s - self._start_s)
+        return self.frames.map_from_frame(frame, self._number)
 
     def _map_poses(self, costmap: LayeredCostmap, now_s: float) -> Dict[str, Optional[Pose3D]]:
         """Return the pose of a costmap's frame in the frames of its maps, which are ``map``."""
         frame = costmap.params.global_frame
-        pose = self.map_from(frame, now_s).to_3d()
+        pose = self.map_from(frame).to_3d()
         return dict.fromkeys(costmap.map_frames, pose)
 
-    def _located(self, map_from_base: Pose3D, now_s: float) -> RobotPoses:
+    def _located(self, map_from_base: Pose3D) -> RobotPoses:
         """Express the robot's pose in the frames of the costmaps."""
-        if self._frames.are_fixed:
+        if self.frames.rows is None:
             pose = map_from_base.to_2d()
             return RobotPoses(pose, pose)
-        at = self._in_costmaps(map_from_base, now_s)
+        at = self._in_costmaps(map_from_base)
         in_global, in_local = (at[one.params.global_frame].to_2d() for one in self.costmaps)
         return RobotPoses(in_global, in_local)
 
-    def _in_costmaps(self, map_from_pose: Pose3D, now_s: float) -> Dict[str, Pose3D]:
+    def _in_costmaps(self, map_from_pose: Pose3D) -> Dict[str, Pose3D]:
         """Express a pose in ``map`` in the frames of the costmaps, by their names."""
         return {
-            frame: pose_in(self.map_from(frame, now_s), map_from_pose)
+            frame: pose_in(self.map_from(frame), map_from_pose)
             for frame in dict.fromkeys(costmap.params.global_frame for costmap in self.costmaps)
         }
 
@@ -193,8 +191,6 @@ class NavigatorGroup:
         """Build the navigators of ``robots``; ``lidars`` are those of all robots."""
         self.setup = setup
         self._lidars = lidars
-        self._start_s = setup.start_step / STEPS_PER_S
-        self._frames = self._frames_of(setup.seed)
         self.lidar_enabled = np.ones(len(setup.names), dtype=bool)
         self.intentions = [Intention(idle_priority(n)) for n in range(len(setup.names))]
         self.last_scans: Dict[int, LocatedScan] = {}
@@ -211,7 +207,7 @@ class NavigatorGroup:
 
     def new_robot(self, number: int) -> LoopRobot:
         """Build a robot's navigator; the planners of the group share their working memory."""
-        robot = LoopRobot(self.setup.configurations[number], number, self._frames, self._start_s)
+        robot = LoopRobot(self.setup.configurations[number], number)
         planner = robot.navigator.planner
         if isinstance(planner, (Navfn, SearchPlanner)):
             planner.wave = self._wave
@@ -227,6 +223,7 @@ class NavigatorGroup:
         numbers = [number for number in self.robots if self.lidar_enabled[number]]
         for number, scan in zip(numbers, self._lidars.scan(states.bodies, numbers, now_s)):
             map_from_lidar = states[number].map_from_base.compose(base_from_lidar)
+            self.robots[number].frames = states.frames
             self.robots[number].add_scan(scan, map_from_lidar, now_s)
             scans[number] = (scan, map_from_lidar)
         self.last_scans = scans
@@ -252,6 +249,8 @@ class NavigatorGroup:
             states: States of all robots.
             goals: New goals in ``map`` of robots of this group, by number.
         """
+        for robot in self.robots.values():
+            robot.frames = states.frames
         for number, goal in goals.items():
             self.robots[number].waiting_goal = goal
         self.before_ticks(now_s)
@@ -277,7 +276,7 @@ class NavigatorGroup:
         """Tick navigator ``number`` among the peers in reach, in ``map``."""
         robot = self.robots[number]
         tick, located = robot.navigate(now_s, states[number], peers)
-        intention = robot.intention(now_s)
+        intention = robot.intention()
         return NavigatorResult(
             number,
             tick,
@@ -287,24 +286,20 @@ class NavigatorGroup:
             None if intention.is_same(self.intentions[number]) else intention,
         )
 
-    def reset(self, now_s: float, seed: int, jumped_back: bool, lidars: Lidars) -> None:
+    def reset(self, now_s: float, jumped_back: bool, lidars: Lidars) -> None:
         """Continue after a reset of the simulation.
 
         Args:
             now_s: Simulated time.
-            seed: Seed of the simulation.
             jumped_back: The clock has jumped back, so that the navigators restart.
             lidars: LIDARs of all robots.
         """
-        self._lidars, self._start_s, self._frames = lidars, now_s, self._frames_of(seed)
+        self._lidars = lidars
         for robot in self.robots.values():
-            robot.reset(self._frames, now_s, jumped_back)
+            robot.reset(now_s, jumped_back)
 
     def close(self) -> None:
         """Free what a subclass holds; nothing is called afterwards."""
-
-    def _frames_of(self, seed: int) -> OdomFrames:
-        return OdomFrames(self.setup.simulation.odom_drift, len(self.setup.names), seed)
 
     def _peers_in_reach(
         self, robots: List[int], now_s: float, states: RobotStates

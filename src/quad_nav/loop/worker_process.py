@@ -30,6 +30,7 @@ from quad_nav.navigator.tick import RobotPoses, State, Tick
 from quad_nav.peers.peer import Intention
 from quad_nav.sim.casters import Lidars, kernel_lidars
 from quad_nav.sim.flight import BODY_VALUES, BodyState
+from quad_nav.sim.odometry import OdomFrames
 from quad_nav.sim.robot_state import RobotStates
 from quad_nav.sim.simulation_params import STEPS_PER_S
 from quad_nav.timing import is_due
@@ -75,6 +76,7 @@ class SharedStates:
         self._moving_shape = (self.SLOTS, moving, 3)
         self._rows = context.RawArray("d", self.SLOTS * robots * BODY_VALUES)
         self._obstacles = context.RawArray("d", self.SLOTS * moving * 3)
+        self._odom_frames = context.RawArray("d", self.SLOTS * robots * 3)
         self._enabled = context.RawArray("b", robots)
         self.lidar_enabled[:] = True
 
@@ -87,6 +89,11 @@ class SharedStates:
     def obstacles(self) -> NDArray[np.float64]:
         """float64[SLOTS, m, 3], ``BodyState.obstacles``."""
         return np.ndarray(self._moving_shape, float, self._obstacles)
+
+    @property
+    def odom_frames(self) -> NDArray[np.float64]:
+        """float64[SLOTS, n, 3], ``OdomFrames.rows``."""
+        return np.ndarray((self.SLOTS, self._shape[1], 3), float, self._odom_frames)
 
     @property
     def lidar_enabled(self) -> NDArray[np.bool_]:
@@ -122,7 +129,7 @@ class WorkerProcess:
         self._is_ready = self._owes_results = self._is_late = self._owes_views = False
         self._due_s = -math.inf
         self._slot, self._unanswered = 0, 0
-        self._written: Optional[BodyState] = None  # what is in the slot
+        self._written: Optional[RobotStates] = None  # what is in the slot
         context = multiprocessing.get_context(start_method)
         self._shared = SharedStates(len(setup.names), len(setup.scene.moving_shapes), context)
         self._pipe, worker_end = context.Pipe()
@@ -167,7 +174,7 @@ class WorkerProcess:
     def scan(self, now_s: float, states: RobotStates) -> None:
         """Start ``NavigatorGroup.scan``; the scans stay in the worker process."""
         if self.is_ready:
-            self._send("scan", now_s, self._write(states.bodies))
+            self._send("scan", now_s, self._write(states))
 
     def begin_navigating(self, now_s: float, states: RobotStates) -> None:
         """Start ``NavigatorGroup.navigate`` if it is due; ``results`` returns what it returns."""
@@ -175,7 +182,7 @@ class WorkerProcess:
         # The slots of unanswered scans are not written again.
         is_wanted = is_wanted or self._unanswered >= SharedStates.SLOTS - STEPS_PER_S // 40
         if is_wanted and self.is_ready:
-            slot = self._write(states.bodies)
+            slot = self._write(states)
             self._send("navigate", now_s, slot, self.goals, self.intentions)
             self.goals, self.intentions = {}, {}
             self._owes_results = True
@@ -236,14 +243,17 @@ class WorkerProcess:
             self._process.kill()
             self._process.join()
 
-    def _write(self, bodies: BodyState) -> int:
-        """Return the slot with the bodies' states."""
-        if bodies is not self._written:
+    def _write(self, states: RobotStates) -> int:
+        """Return the slot with the robots' states."""
+        if states is not self._written:
+            bodies, frames = states.bodies, states.frames.rows
             self._slot = (self._slot + 1) % SharedStates.SLOTS
             self._unanswered += 1
             self._shared.rows[self._slot] = bodies.rows
             self._shared.obstacles[self._slot] = bodies.obstacles
-            self._written = bodies
+            if frames is not None:
+                self._shared.odom_frames[self._slot] = frames
+            self._written = states
         return self._slot
 
     def _send(self, *command: object) -> None:
@@ -314,7 +324,10 @@ class _Worker:
         return kernel_lidars(params.lidar, setup.scene, len(setup.names), seed, radius_m)
 
     def _states(self, slot: int) -> RobotStates:
-        return RobotStates(BodyState(self._shared.rows[slot], self._shared.obstacles[slot]))
+        bodies = BodyState(self._shared.rows[slot], self._shared.obstacles[slot])
+        if self._setup.simulation.odom_drift.is_zero:
+            return RobotStates(bodies)
+        return RobotStates(bodies, OdomFrames(self._shared.odom_frames[slot]))
 
     def scan(self, now_s: float, slot: int) -> None:
         self.group.scan(now_s, self._states(slot))
@@ -340,7 +353,7 @@ class _Worker:
         change(self.group)
 
     def reset(self, now_s: float, seed: int, jumped_back: bool) -> None:
-        self.group.reset(now_s, seed, jumped_back, self._lidars(seed))
+        self.group.reset(now_s, jumped_back, self._lidars(seed))
 
 
 def _packed(result: NavigatorResult) -> Tuple[Any, ...]:

@@ -193,6 +193,7 @@ def odometry(
     angular_radps: Sequence[float],
     frames: Tuple[str, str],
     stamp: int,
+    covariance: NDArray[np.float64] = _ZEROS_36,
 ) -> Any:
     """Build a ``nav_msgs/Odometry``; velocities are in the body frame, the second of ``frames``."""
     twist = tuple(linear_mps), tuple(angular_radps)
@@ -200,7 +201,7 @@ def odometry(
         "nav_msgs/Odometry",
         header(frames[0], stamp),
         frames[1],
-        (place(odom_from_base), _ZEROS_36),
+        (place(odom_from_base), covariance),
         (twist, _ZEROS_36),
     )
 

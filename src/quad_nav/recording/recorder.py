@@ -150,13 +150,16 @@ class Recorder(FlightObserver):
         ]
 
     def _write_odometry(self, robot: int, state: RobotState, stamp: int) -> None:
-        map_from_odom = self._flight.simulation.map_from_frame(f"odom{robot}", robot)
+        simulation = self._flight.simulation
+        map_from_odom = simulation.map_from_frame(f"odom{robot}", robot)
+        errors = simulation.odometry
         odometry = messages.odometry(
             pose_in(map_from_odom, state.map_from_base),
             state.linear_mps,
             state.angular_radps,
             (f"odom{robot}", f"base_link{robot}"),
             stamp,
+            *(() if errors is None else (errors.covariance_36(robot),)),
         )
         self._write(f"/odom{robot}", stamp, odometry, _SIMULATOR)
 

@@ -7,6 +7,7 @@ passed on, name configuration and scene without their folders.
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Dict, Mapping, Optional, Sequence
 
@@ -42,7 +43,7 @@ def offline_facts(
         "goals": _goals(options.goals),
         "airframe": airframe_name(simulation.airframe),
         "jitter_m": simulation.jitter_m,
-        "odom_drift": [simulation.odom_drift.speed_mps, simulation.odom_drift.turn_radps],
+        "odom_drift": asdict(simulation.odom_drift),
         "lidar": {
             "beams": simulation.lidar.beam_count,
             "scan_range_rad": simulation.lidar.scan_range_rad,

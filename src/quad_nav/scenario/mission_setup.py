@@ -145,7 +145,7 @@ def _request(
 def _odometry_drifts(all_parameters: Mapping[str, Any]) -> bool:
     simulator = all_parameters.get("simulator")
     drift = simulator.get("odom_drift") if isinstance(simulator, Mapping) else None
-    return drift is not None and drift != [0.0, 0.0]
+    return isinstance(drift, Mapping) and any(drift.values())
 
 
 def _mission_setup(

@@ -16,7 +16,7 @@ from quad_nav.files.values import (
 )
 from quad_nav.scenario import RANDOM
 from quad_nav.sim.flight import AIRFRAMES
-from quad_nav.sim.odometry import MAX_DRIFT
+from quad_nav.sim.odometry import ERROR_NAMES, MAX_ERROR
 from quad_nav.sim.simulation_params import LIDAR_CASTERS, STEPS_PER_S
 
 START_S = 1.0
@@ -41,10 +41,12 @@ def _divides(value: Any) -> bool:
     return abs(steps - round(steps)) < 1e-9
 
 
-def _is_drift(value: Any) -> bool:
-    """True for two speeds of an odometry frame."""
-    speed = number(at_least=0, at_most=MAX_DRIFT)
-    return isinstance(value, (list, tuple)) and len(value) == 2 and all(map(speed.accepts, value))
+def _are_errors(value: Any) -> bool:
+    """True for errors of odometry, by name."""
+    error = number(at_least=0, at_most=MAX_ERROR)
+    return isinstance(value, dict) and all(
+        name in ERROR_NAMES and error.accepts(one) for name, one in value.items()
+    )
 
 
 def _is_packages(value: Any) -> bool:
@@ -86,7 +88,9 @@ RULES: Dict[str, Rule] = {
     "step_size": number(at_least=0),
     "range_noise": number(at_least=0),
     "odom_drift": Rule(
-        _is_drift, f"[m/s, rad/s], two numbers from 0 to {MAX_DRIFT:g}, such as [0.02, 0.01]"
+        _are_errors,
+        f"a mapping of {', '.join(ERROR_NAMES)} to numbers from 0 to {MAX_ERROR:g}, such as "
+        "{per_m: 0.05, per_rad: 0.05}",
     ),
     "command_timeout": number(at_least=0),
     "controller_period": number(at_least=0),

@@ -21,7 +21,7 @@ from quad_nav.scenario.scenario import (
 )
 from quad_nav.sim.flight import AIRFRAMES
 from quad_nav.sim.lidar import LidarParams
-from quad_nav.sim.odometry import OdomDrift
+from quad_nav.sim.odometry import OdometryErrors
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.simulation_params import SimulationParams
 from quad_nav.sim.start_poses import start_poses
@@ -41,7 +41,7 @@ DEFAULTS: Dict[str, Any] = {
     "step_size": 0.0,  # rad between beams; 0: 512 beams over scan_range
     "lidar_rate": 20.0,  # scans per simulated second
     "range_noise": 0.0,  # standard deviation, m
-    "odom_drift": [0.0, 0.0],  # m/s and rad/s of each frame odom{i} in map
+    "odom_drift": {},  # errors of the odometry, by name
     "seed": 0,  # for noise, jitter and drift
     "jitter": 0.0,  # radius of the disc in which starts are displaced, m
     "command_timeout": 0.5,  # s; a robot hovers after command_timeout plus
@@ -222,5 +222,5 @@ def _simulation_params(values: Mapping[str, Any]) -> SimulationParams:
         controller_period_s=float(values["controller_period"]),
         jitter_m=float(values["jitter"]),
         lidar_caster=values["lidar"],
-        odom_drift=OdomDrift(*map(float, values["odom_drift"])),
+        odom_drift=OdometryErrors.of(values["odom_drift"]),
     )

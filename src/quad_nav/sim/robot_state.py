@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from quad_nav.geometry import Pose3D, Twist2D, rotate
 from quad_nav.sim.flight import BodyState
 from quad_nav.sim.flight_law import planar_states
+from quad_nav.sim.odometry import FIXED_FRAMES, OdomFrames
 
 
 @dataclass(frozen=True)
@@ -51,10 +52,11 @@ class RobotStates(Sequence[RobotState]):
 
     Attributes:
         bodies: The states as arrays.
+        frames: The odometry frames.
     """
 
-    def __init__(self, bodies: BodyState) -> None:
-        self.bodies = bodies
+    def __init__(self, bodies: BodyState, frames: OdomFrames = FIXED_FRAMES) -> None:
+        self.bodies, self.frames = bodies, frames
         self._states: List[Optional[RobotState]] = [None] * len(bodies.rows)
 
     def __len__(self) -> int:

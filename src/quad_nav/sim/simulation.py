@@ -20,10 +20,15 @@ from quad_nav.sim.contacts import Contact, ContactLog
 from quad_nav.sim.flight import BodyState, FlightLaw, limit_command
 from quad_nav.sim.free_flight import FreeFlight
 from quad_nav.sim.movers import Movers
-from quad_nav.sim.odometry import OdomFrames
-from quad_nav.sim.robot_state import RobotState, robot_state
+from quad_nav.sim.odometry import FIXED_FRAMES, Odometry, OdomFrames
+from quad_nav.sim.robot_state import RobotState, RobotStates, robot_state
 from quad_nav.sim.scene import Scene
-from quad_nav.sim.simulation_params import STEP_S, STEPS_PER_S, SimulationParams
+from quad_nav.sim.simulation_params import (
+    STEP_S,
+    STEPS_PER_ODOMETRY,
+    STEPS_PER_S,
+    SimulationParams,
+)
 from quad_nav.sim.start_poses import start_poses
 
 _STEPS_NEAR = 12
@@ -32,6 +37,9 @@ _STEPS_NEAR = 12
 
 class Simulation:
     """Quadcopters in a scene.
+
+    Attributes:
+        odometry: What the quadcopters measure of their motion; None if that is exact.
 
     Args:
         scene: The scene.
@@ -67,13 +75,11 @@ class Simulation:
         self._world = World(scene, self._starts, params.airframe, STEP_S, gui)
         # The engine's window and rays need the bodies in the engine.
         self._always_in_engine = gui or params.lidar_caster == "bullet"
-        self._odom_frames = OdomFrames(params.odom_drift, n_robots, seed)
         self._caster = self._new_caster()
         self._begin()
 
     def _begin(self) -> None:
         n = self.n_robots
-        self._first_step = self.step_count
         self._commands = np.zeros((n, 3))
         self._hover_step = np.full(n, -math.inf)  # last step for which a command is valid
         self._next_hover_step = math.inf
@@ -81,6 +87,7 @@ class Simulation:
         self.lidars = Lidars(self.params.lidar, self._caster, n, self.seed)
         self._state = self._world.state()
         self._place_obstacles()
+        self.odometry = self._new_odometry()
         self._free_flight = FreeFlight(
             self.scene, n, self.params.airframe.radius_m, self._law, STEP_S
         )
@@ -90,6 +97,12 @@ class Simulation:
         self._engine_end = math.inf if self._always_in_engine else -math.inf
         self._engine_until = np.full(n, self._engine_end)
         self._none = np.zeros(n, dtype=bool)
+
+    def _new_odometry(self) -> Optional[Odometry]:
+        errors = self.params.odom_drift
+        if errors.is_zero:
+            return None
+        return Odometry(errors, RobotStates(self._state).poses, self.now_s, self.seed)
 
     def _new_caster(self) -> Caster:
         params = self.params
@@ -127,7 +140,6 @@ class Simulation:
         if seed is not None and seed != self.seed:
             radius_m, params, n = self.params.airframe.radius_m, self.params, self.n_robots
             self._starts = start_poses(self.scene, n, params.jitter_m, seed, radius_m)
-            self._odom_frames = OdomFrames(params.odom_drift, n, seed)
             self.seed = seed
         if start_step is not None:
             self.step_count = start_step
@@ -194,10 +206,18 @@ class Simulation:
         end = self.step_count + steps
         contacts: List[Contact] = []
         while self.step_count < end:
-            contacts += self._advance_to(min(end, self._let_people_react()))
+            contacts += self._advance_to(min(end, self._let_people_react(), self._next_odometry()))
+            if self.odometry is not None and self.step_count % STEPS_PER_ODOMETRY == 0:
+                self.odometry.update(RobotStates(self._state).poses, self.now_s)
         if self.movers:
             self._state = replace(self._state, obstacles=self.movers.poses(self.now_s))
         return contacts
+
+    def _next_odometry(self) -> float:
+        """Return the step at which odometry is computed next."""
+        if self.odometry is None:
+            return math.inf
+        return (self.step_count // STEPS_PER_ODOMETRY + 1) * STEPS_PER_ODOMETRY
 
     def _let_people_react(self) -> float:
         """Return the step up to which the poses of moving obstacles are known then."""
@@ -303,10 +323,14 @@ class Simulation:
         """Return the state of a quadcopter."""
         return robot_state(self._state.rows[robot])
 
+    @property
+    def odom_frames(self) -> OdomFrames:
+        """The odometry frames of all quadcopters now."""
+        return FIXED_FRAMES if self.odometry is None else self.odometry.frames
+
     def map_from_frame(self, frame: str, robot: int) -> Pose2D:
         """Return the present pose of a frame of a quadcopter in ``map``, see ``OdomFrames``."""
-        elapsed_s = (self.step_count - self._first_step) / STEPS_PER_S
-        return self._odom_frames.map_from_frame(frame, robot, elapsed_s)
+        return self.odom_frames.map_from_frame(frame, robot)
 
     def scan(self, robot: int) -> Scan:
         """Return a scan of a quadcopter's LIDAR at the present time."""

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from quad_nav.errors import InputError
 from quad_nav.sim.flight import Airframe, FlightParams
 from quad_nav.sim.lidar import LidarParams
-from quad_nav.sim.odometry import OdomDrift
+from quad_nav.sim.odometry import OdometryErrors
 
 STEPS_PER_S = 240
 STEP_S = 1.0 / STEPS_PER_S
+STEPS_PER_ODOMETRY = STEPS_PER_S // 40
 LIDAR_CASTERS = ("kernel", "bullet")
 FASTEST_RATE = 1000.0
 """From this rate on the simulation goes as fast as it can, and does not lag."""
@@ -32,7 +33,7 @@ class SimulationParams:
         controller_period_s: Period of the navigators' commands.
         jitter_m: Largest random displacement of a start pose.
         lidar_caster: Ray caster, see ``casters``: "kernel", or "bullet" for the physics engine.
-        odom_drift: Speeds at which the odometry frames drift and turn in ``map``.
+        odom_drift: Errors of the odometry.
 
     Raises:
         InputError: A value is out of range; lists all of them.
@@ -45,7 +46,7 @@ class SimulationParams:
     controller_period_s: float = 0.05
     jitter_m: float = 0.0
     lidar_caster: str = "kernel"
-    odom_drift: OdomDrift = OdomDrift()
+    odom_drift: OdometryErrors = OdometryErrors()
 
     def __post_init__(self) -> None:
         problems = [

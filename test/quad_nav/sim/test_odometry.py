@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 
@@ -21,12 +22,12 @@ from quad_nav.recording.bag_file import read_messages
 from quad_nav.recording.bag_trace import read_trace
 from quad_nav.recording.recorder import Recorder
 from quad_nav.scenario.scenario import read_configurations
-from quad_nav.sim.odometry import OdomDrift, OdomFrames, pose_in
+from quad_nav.sim.odometry import FIXED_FRAMES, Odometry, OdometryErrors, OdomFrames, pose_in
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.sim.simulation import Simulation
 from quad_nav.sim.simulation_params import SimulationParams
 
-DRIFT = OdomDrift(0.04, 0.02)
+DRIFT = OdometryErrors(per_m=0.05, per_rad=0.05, speed=0.02, turn=0.005, slip=0.05)
 QUARTER_TURN = math.pi / 2
 
 
@@ -44,31 +45,83 @@ def configuration(folder: Path, global_frame: str, local_frame: str) -> str:
 # -- frames ------------------------------------------------------------------------------
 
 
-def test_a_frame_moves_and_turns_at_the_given_speeds():
-    frames = OdomFrames(OdomDrift(0.2, 0.1), 3, seed=4)
-    early, late = frames.map_from_odom(1, 5.0), frames.map_from_odom(1, 10.0)
-    assert (late.x_m, late.y_m) == pytest.approx((2.0 * early.x_m, 2.0 * early.y_m))
-    assert math.hypot(late.x_m, late.y_m) == pytest.approx(2.0)
-    assert (abs(early.yaw_rad), abs(late.yaw_rad)) == (0.5, 1.0)
-    assert frames.map_from_odom(1, 0.0) == Pose2D(0.0, 0.0)
+def measured(robots=1, yaw_rad=0.0, length_m=1.0, turn_rad=0.0, seconds=4.0, seed=4, **errors):
+    """Return the odometry after a straight way, with a constant turn, in steps of 1/40 s."""
+    poses = np.zeros((robots, 3))
+    poses[:, 2] = yaw_rad
+    odometry = Odometry(OdometryErrors(**errors), poses, 0.0, seed)
+    for step in range(1, round(40 * seconds) + 1):
+        share = step / (40 * seconds)
+        moved = np.array([math.cos(yaw_rad), math.sin(yaw_rad), turn_rad])
+        odometry.update(poses + share * np.array([length_m, length_m, 1.0]) * moved, step / 40)
+    return odometry
+
+
+def rows(odometry, pose):
+    """Return the poses float64[n, 3] that odometry measured of robots at a pose in the map."""
+    frames = (odometry.frames.map_from_odom(n) for n in range(len(odometry.frames.rows)))
+    return np.array([dataclasses.astuple(pose.relative_to(frame)) for frame in frames])
+
+
+def test_after_a_metre_the_way_has_its_standard_deviation_in_each_direction():
+    found = rows(measured(robots=4000, per_m=0.05), Pose2D(1.0, 0.0))
+    assert found.mean(axis=0) == pytest.approx([1.0, 0.0, 0.0], abs=0.003)
+    assert found[:, :2].std(axis=0) == pytest.approx(0.05, rel=0.05)
+    assert np.all(found[:, 2] == 0.0)
+
+
+def test_the_error_of_a_way_grows_with_its_root():
+    found = rows(measured(robots=4000, length_m=4.0, per_m=0.05), Pose2D(4.0, 0.0))
+    assert found[:, :2].std(axis=0) == pytest.approx(0.1, rel=0.05)
+
+
+def test_after_a_turn_of_a_radian_the_yaw_has_its_standard_deviation():
+    odometry = measured(robots=4000, length_m=0.0, turn_rad=1.0, per_rad=0.05)
+    assert rows(odometry, Pose2D(0.0, 0.0, 1.0))[:, 2].std() == pytest.approx(0.05, rel=0.05)
+
+
+def test_the_covariance_is_that_of_the_errors():
+    """An error of yaw moves what is flown after it to the side."""
+    odometry = measured(robots=4000, turn_rad=1.0, per_m=0.05, per_rad=0.05)
+    found = rows(odometry, Pose2D(1.0, 0.0, 1.0))
+    assert np.cov(found.T) == pytest.approx(odometry.covariances[0], abs=2e-4)
+    message = odometry.covariance_36(0).reshape(6, 6)
+    assert message[5, 5] == pytest.approx(0.05**2)
+    assert message[1, 5] == odometry.covariances[0][1, 2] != 0.0
+    assert not message[2:5].any()
+
+
+def test_at_rest_a_frame_moves_and_turns_at_the_given_speeds():
+    moved = measured(length_m=0.0, seconds=10.0, speed=0.2).frames.map_from_odom(0)
+    assert math.hypot(moved.x_m, moved.y_m) == pytest.approx(2.0)
+    turned = measured(robots=2, length_m=0.0, seconds=10.0, turn=0.1).frames.rows
+    assert sorted(turned[:, 2]) == pytest.approx([-1.0, 1.0])
+
+
+def test_a_slip_loses_the_way_of_half_a_second_and_no_turn():
+    """8 pieces of half a second of 0.125 m each, of which some are lost."""
+    odometry = measured(robots=400, turn_rad=0.5, slip=0.25)
+    found = rows(odometry, Pose2D(1.0, 0.0, 0.5))
+    assert found[:, 2] == pytest.approx(0.5)
+    ways = np.hypot(found[:, 0], found[:, 1])
+    assert ways.mean() == pytest.approx(0.75, abs=0.03)
+    assert ways.max() <= 1.0 + 1e-9
 
 
 def test_frames_differ_by_robot_and_seed():
-    frames = OdomFrames(DRIFT, 2, seed=4)
-    first, second = (frames.map_from_odom(robot, 10.0) for robot in (0, 1))
-    assert first.yaw_rad == -second.yaw_rad != 0.0
-    assert first.distance_to(second) > 0.01
-    assert OdomFrames(DRIFT, 2, seed=4).map_from_odom(0, 10.0) == first
-    assert OdomFrames(DRIFT, 2, seed=5).map_from_odom(0, 10.0).distance_to(first) > 0.01
+    first = measured(robots=2, speed=0.04, turn=0.02).frames.rows
+    assert np.abs(first[0] - first[1]).max() > 0.01
+    assert np.array_equal(measured(robots=2, speed=0.04, turn=0.02).frames.rows, first)
+    other = measured(robots=2, speed=0.04, turn=0.02, seed=5).frames.rows
+    assert np.abs(other - first).max() > 0.01
 
 
 def test_only_a_robot_s_own_odometry_frame_moves():
-    frames = OdomFrames(DRIFT, 2, seed=0)
-    moved = frames.map_from_odom(1, 10.0)
-    assert frames.map_from_frame("odom1", 1, 10.0) == moved
-    assert frames.map_from_frame("/odom1", 1, 10.0) == moved
-    assert frames.map_from_frame("map", 1, 10.0) == Pose2D(0.0, 0.0)
-    assert OdomFrames(OdomDrift(), 2, seed=0).map_from_odom(1, 10.0) == Pose2D(0.0, 0.0)
+    frames = measured(robots=2, speed=0.04).frames
+    moved = frames.map_from_odom(1)
+    assert frames.map_from_frame("odom1", 1) == frames.map_from_frame("/odom1", 1) == moved
+    assert frames.map_from_frame("map", 1) == Pose2D(0.0, 0.0) != moved
+    assert FIXED_FRAMES.map_from_odom(1) == Pose2D(0.0, 0.0)
 
 
 def test_a_pose_in_a_frame_that_was_moved_and_turned():
@@ -94,14 +147,13 @@ def test_the_simulation_starts_and_restarts_without_drift():
     simulation = Simulation(
         load_scene(shipped("scenes", "arena.yaml")),
         2,
-        SimulationParams(odom_drift=OdomDrift(0.2, 0.1)),
+        SimulationParams(odom_drift=OdometryErrors(speed=0.2, turn=0.1)),
         start_step=240,
     )
     assert simulation.map_from_frame("odom0", 0) == Pose2D(0.0, 0.0)
     simulation.advance(480)
     drifted = simulation.map_from_frame("odom0", 0)
-    assert math.hypot(drifted.x_m, drifted.y_m) == pytest.approx(0.4)  # after 2 s
-    assert abs(drifted.yaw_rad) == pytest.approx(0.2)
+    assert abs(drifted.yaw_rad) == pytest.approx(0.2, abs=1e-6)  # after 2 s
     simulation.reset()
     assert simulation.map_from_frame("odom0", 0) == Pose2D(0.0, 0.0)
     simulation.close()
@@ -110,20 +162,21 @@ def test_the_simulation_starts_and_restarts_without_drift():
 def test_a_goal_in_the_map_becomes_one_in_the_costmap_s_frame(tmp_path):
     """Only then is the goal known in the frame that the robot plans in, ten seconds after start."""
     config = configuration(tmp_path / "config", "odom$(arg i)", "map")
-    frames = OdomFrames(OdomDrift(0.2, 0.1), 1, seed=0)
-    robot = LoopRobot(read_configurations(config, 1)[0], 0, frames)
+    map_from_odom = Pose2D(-1.2, 1.6, 0.5)
+    robot = LoopRobot(read_configurations(config, 1)[0], 0)
+    robot.frames = OdomFrames(np.array([dataclasses.astuple(map_from_odom)]))
     robot.waiting_goal = Pose2D(3.0, 4.0, 0.5)
     robot.is_due(10.0)
-    goal, map_from_odom = robot.navigator.goal, frames.map_from_odom(0, 10.0)
+    goal = robot.navigator.goal
     assert map_from_odom.transform(goal.x_m, goal.y_m) == pytest.approx((3.0, 4.0))
     assert goal.yaw_rad == pytest.approx(0.5 - map_from_odom.yaw_rad)
     assert goal.distance_to(Pose2D(3.0, 4.0)) > 1.0
 
 
-@pytest.mark.parametrize("speeds", [(-0.1, 0.0), (0.0, 1.1), (math.nan, 0.0), (0.0, math.inf)])
-def test_speeds_out_of_range_are_refused(speeds):
-    with pytest.raises(InputError, match="odom_drift: .*expected m/s and rad/s, 0 to 1 each"):
-        OdomDrift(*speeds)
+@pytest.mark.parametrize("error", [-0.1, 1.1, math.nan, math.inf])
+def test_errors_out_of_range_are_refused(error):
+    with pytest.raises(InputError, match="odom_drift/slip: .*expected 0 to 1"):
+        OdometryErrors(slip=error)
 
 
 # -- flights -----------------------------------------------------------------------------
@@ -142,7 +195,7 @@ def test_without_drift_the_frame_of_a_costmap_changes_no_bit(tmp_path):
 
 def test_goals_are_reached_with_both_costmaps_in_a_frame_that_drifts(tmp_path):
     config = configuration(tmp_path / "config", *2 * ("odom$(arg i)",))
-    drift = SimulationParams(odom_drift=OdomDrift(0.02, 0.005))
+    drift = SimulationParams(odom_drift=DRIFT)
     summary = flown(setup(tmp_path, config=config, simulation=drift, time_limit_s=60.0)).summary
     assert summary.success, summary
 
@@ -190,7 +243,7 @@ class States(FlightObserver):
 def recorded(tmp_path_factory):
     folder = tmp_path_factory.mktemp("drift")
     config = configuration(folder / "config", *2 * ("odom$(arg i)",))
-    drift = SimulationParams(odom_drift=OdomDrift(0.02, 0.005))
+    drift = SimulationParams(odom_drift=DRIFT)
     states, recorder = States(), Recorder(folder / "flight.bag")
     flight = flown(setup(folder, config=config, simulation=drift), [states, recorder])
     return folder / "flight.bag", states, flight

@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import re
 import struct
-from typing import Any, Callable, List, NamedTuple, Sequence, Tuple
+from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 import genpy
 import numpy as np
@@ -241,7 +241,7 @@ class TransformWriter:
 
 
 class OdometryWriter:
-    """Serialise the odometry of one robot, without covariances."""
+    """Serialise the odometry of one robot, without covariances of the velocity."""
 
     def __init__(self, frame: str, child: str) -> None:
         self._layout = bytearray(_bytes(Odometry(Header(0, None, frame), child, None, None)))
@@ -249,12 +249,20 @@ class OdometryWriter:
         self._pose = self._twist - 8 * (_POSE + _COVARIANCE)
         self._seq = 0
 
-    def message(self, stamp: rospy.Time, pose: Floats, twist: Floats) -> rospy.AnyMsg:
-        """Return the next message, with pose float64[7] and twist float64[6] as in `States`."""
+    def message(
+        self, stamp: rospy.Time, pose: Floats, twist: Floats, covariance: Optional[Floats] = None
+    ) -> rospy.AnyMsg:
+        """Return the next message, with pose float64[7] and twist float64[6] as in `States`.
+
+        ``covariance`` is that of the pose, float64[36]; without it, it is 0.
+        """
         self._seq += 1
         struct.pack_into("<3I", self._layout, 0, self._seq, stamp.secs, stamp.nsecs)
         struct.pack_into("<7d", self._layout, self._pose, *pose.tolist())
         struct.pack_into("<6d", self._layout, self._twist, *twist.tolist())
+        if covariance is not None:
+            place = self._pose + 8 * _POSE
+            self._layout[place : place + 8 * _COVARIANCE] = covariance.astype("<f8").tobytes()
         return serialised(bytes(self._layout))
 
 

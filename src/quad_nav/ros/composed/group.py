@@ -79,7 +79,7 @@ class ComposedGroup(NavigatorGroup):
     def new_robot(self, number: int) -> ComposedRobot:
         """Build a robot's navigator and its interface."""
         configuration = self.setup.configurations[number]
-        return ComposedRobot(configuration, number, self._frames, self._start_s, self.transforms)
+        return ComposedRobot(configuration, number, self.transforms)
 
     def set_maps(self) -> None:
         """Leave static layers to their topics."""
@@ -98,7 +98,7 @@ class ComposedGroup(NavigatorGroup):
         """Tick the navigators that are due, and publish their results."""
         set_time(time_message(now_s))
         self._states = states
-        self.transforms.update(now_s, states, self._frames, now_s - self._start_s)
+        self.transforms.update(now_s, states)
         if self._needs_transforms:
             self.transforms.store()
         results = super().navigate(now_s, states, goals)

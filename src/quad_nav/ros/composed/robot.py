@@ -20,7 +20,6 @@ from quad_nav.ros.navigator import sensors, static_maps
 from quad_nav.ros.navigator.health_meters import InputMeter
 from quad_nav.ros.navigator.intention_topics import robot_publisher
 from quad_nav.ros.navigator.robot_interface import RobotInterface
-from quad_nav.sim.odometry import OdomFrames
 from quad_nav.sim.robot_state import RobotState
 from quad_nav.topics.publishing import in_fleet
 
@@ -40,15 +39,13 @@ class ComposedRobot(LoopRobot):
         self,
         configuration: Configuration,
         number: int,
-        frames: OdomFrames,
-        start_s: float,
         transforms: Transforms,
     ) -> None:
-        """Build the navigator and its interface; the ``frames`` drift from ``start_s`` on."""
+        """Build the navigator and its interface."""
         self._names = names = in_fleet(number)
-        super().__init__(configuration, number, frames, start_s)
+        super().__init__(configuration, number)
         self._sensors = sensors.connect(self, names, self._lidar.sinks)
-        self._transforms, self._now_s = transforms, start_s
+        self._transforms = transforms
         self._state: Optional[RobotState] = None
         self._odometry_meter = InputMeter(names("odom"))
         self._scan_meter = InputMeter(names("scan"), self._lidar.expected_period_s)
@@ -100,7 +97,7 @@ class ComposedRobot(LoopRobot):
     def poll(self, now_s: float, state: RobotState) -> None:
         """Take the robot's state, and what has come from topics: goals, messages of sensors."""
         with self.interface.lock:
-            self._now_s, self._state = now_s, state
+            self._state = state
             self._odometry_meter.add(now_s, now_s)
             for sensor in self._sensors:
                 sensor.deliver(self._transforms)
@@ -115,7 +112,7 @@ class ComposedRobot(LoopRobot):
         with self.interface.lock:
             try:
                 tick, located = super().navigate(now_s, state, peers)
-                in_global = self._in_costmaps(state.map_from_base, now_s)
+                in_global = self._in_costmaps(state.map_from_base)
                 frame = self.navigator.global_costmap.params.global_frame
                 self.interface.publish(tick, LocatedPose(in_global[frame], now_s), located)
             except PluginError as error:
@@ -133,4 +130,4 @@ class ComposedRobot(LoopRobot):
     def _located_now(self) -> RobotPoses:
         if self._state is None:
             return RobotPoses(None, None)
-        return self._located(self._state.map_from_base, self._now_s)
+        return self._located(self._state.map_from_base)

@@ -6,11 +6,11 @@ from typing import Optional, Tuple
 
 import rospy
 
-from quad_nav.geometry import Pose2D, Pose3D
+from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.conversions import time_message, transform_message
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.sim.lidar import base_from_lidar
-from quad_nav.sim.odometry import OdomFrames, pose_in
+from quad_nav.sim.odometry import pose_in
 from quad_nav.sim.robot_state import RobotStates
 
 
@@ -22,34 +22,25 @@ class ComposedTransforms(Transforms):
 
     def __init__(self) -> None:
         super().__init__()
-        self._present: Optional[Tuple[float, RobotStates, OdomFrames, float]] = None
+        self._present: Optional[Tuple[float, RobotStates]] = None
         self._stored_s = -1.0
 
-    def update(
-        self, now_s: float, states: RobotStates, frames: OdomFrames, elapsed_s: float
-    ) -> None:
-        """Take the states of all robots at a time.
-
-        Args:
-            now_s: Simulated time.
-            states: States of all robots.
-            frames: Odometry frames of all robots.
-            elapsed_s: Time since these began to drift.
-        """
-        self._present = now_s, states, frames, elapsed_s
+    def update(self, now_s: float, states: RobotStates) -> None:
+        """Take the states of all robots at a simulated time."""
+        self._present = now_s, states
 
     def store(self) -> None:
         """Add the frames of all robots as they are now, once for each time."""
         present = self._present
         if present is None or present[0] == self._stored_s:
             return
-        now_s, states, frames, elapsed_s = present
+        now_s, states = present
         self._stored_s = now_s
         stamp = time_message(now_s)
         with self._lock:
             self._update_time()
             for robot, state in enumerate(states):
-                map_from_odom: Pose2D = frames.map_from_odom(robot, elapsed_s)
+                map_from_odom = states.frames.map_from_odom(robot)
                 odom_from_base = pose_in(map_from_odom, state.map_from_base)
                 odom, base, lidar = f"odom{robot}", f"base_link{robot}", f"Lidar{robot}"
                 for pose, parent, child in (

@@ -32,7 +32,6 @@ from visualization_msgs.msg import Marker, MarkerArray
 from quad_nav.errors import InputError, printable
 from quad_nav.files.kernel_cache import COMPILING, announced, cache_warnings
 from quad_nav.files.values import is_number
-from quad_nav.loop.flight_loop import STEPS_PER_ODOMETRY
 from quad_nav.parameter import Parameter
 from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.readiness import server_parameters, start_node
@@ -52,7 +51,12 @@ from quad_nav.scenario.simulator_setup import (
 from quad_nav.scenario.warm_up import simulate
 from quad_nav.sim.body import GoalSphere
 from quad_nav.sim.pacing import Pacer, RateMeter
-from quad_nav.sim.simulation_params import FASTEST_RATE, STEP_S, STEPS_PER_S
+from quad_nav.sim.simulation_params import (
+    FASTEST_RATE,
+    STEP_S,
+    STEPS_PER_ODOMETRY,
+    STEPS_PER_S,
+)
 from quad_nav.topics.validation import MAX_MAGNITUDE
 
 _START_STEP = STEPS_PER_S

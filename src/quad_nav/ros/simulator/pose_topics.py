@@ -66,18 +66,21 @@ class PoseTopics:
         poses = bodies.rows[:, :7]
         if with_transforms:
             self._publish_transforms(stamp, poses)
-        odometry = [i for i, one in enumerate(self._odometry) if one.get_num_connections()]
+        heard = [i for i, one in enumerate(self._odometry) if one.get_num_connections()]
         bulk = self._in_bulk if self._states.get_num_connections() else self._in_bulk[:0]
-        if not odometry and not len(bulk):
+        if not heard and not len(bulk):
             return
         velocities = bodies.rows[:, 7:].reshape(-1, 2, 3)  # linear and angular, in map
         twists = np.einsum("nij,nki->nkj", bodies.rotations, velocities).reshape(-1, 6)
         if len(bulk):
             states = States(self._simulation.now_s, "map", bulk, poses[bulk], twists[bulk])
             self._states.publish(states_message(states))
-        for i in odometry:
+        for i in heard:
             pose = self._in_odom(i, poses[i])
-            self._odometry[i].publish(self._odometry_writers[i].message(stamp, pose, twists[i]))
+            odometry = self._simulation.odometry
+            covariance = None if odometry is None else odometry.covariance_36(i)
+            message = self._odometry_writers[i].message(stamp, pose, twists[i], covariance)
+            self._odometry[i].publish(message)
 
     def _publish_transforms(self, stamp: rospy.Time, poses: Floats) -> None:
         """Publish `map -> odom{i} -> base_link{i} -> Lidar{i}` of all quadcopters."""
