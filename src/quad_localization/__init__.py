@@ -1,0 +1,1 @@
+"""Know where the robots are: maps, and localization in them."""

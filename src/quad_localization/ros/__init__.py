@@ -1,0 +1,1 @@
+"""Nodes of localization: a thin shell around the modules of this package."""
