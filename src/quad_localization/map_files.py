@@ -71,7 +71,7 @@ def save_map(
     pixels = np.full(cells.shape, _UNKNOWN_PIXEL, np.uint8)
     pixels[(cells >= 0) & (cells <= free_up_to)] = _FREE_PIXEL
     pixels[cells >= occupied_from] = _OCCUPIED_PIXEL
-    height, width = pixels.shape
+    height, width = cells.shape[0], cells.shape[1]
     image = stem.with_name(f"{stem.name}.pgm")
     x_m, y_m, yaw_rad = grid.origin.x_m, grid.origin.y_m, grid.origin.yaw_rad
     text = (

@@ -44,7 +44,8 @@ def test_the_map_of_a_scene_is_drawn_at_its_altitude(tmp_path):
     scene.write_text(
         "size: [2.0, 1.0]\naltitude: 1.0\nwalls: {height: 2.0, thickness: 0.1}\nobstacles:\n"
         "  - {shape: box, centre: [0.5, 0.5], size: [0.2, 0.2], height: 0.5}\n"
-        "  - {shape: box, centre: [1.5, 0.5], size: [0.2, 0.2], height: 1.5}\nstarts: [[1.0, 0.5, 0.0]]\n"
+        "  - {shape: box, centre: [1.5, 0.5], size: [0.2, 0.2], height: 1.5}\n"
+        "starts: [[1.0, 0.5, 0.0]]\n"
     )
     grid = read_map(scene, 0.1)
     assert grid.occupancy.shape == (12, 22)

@@ -24,6 +24,9 @@ START_S = 1.0
 MAX_SIZE_M = 250  # a larger random arena takes minutes to fill with obstacles
 MAX_ROBOTS = 100
 """Each has costmaps of its own: a thousand need more memory than most machines have."""
+SIMULATOR = "simulator"
+LOCALIZATIONS = (SIMULATOR, "none")
+"""Who publishes ``map -> odom{i}``: the simulator, or somebody else."""
 MAX_SEED = 2**63 - 1
 """Recordings hold the seed as an int64."""
 
@@ -92,6 +95,7 @@ RULES: Dict[str, Rule] = {
         f"a mapping of {', '.join(ERROR_NAMES)} to numbers from 0 to {MAX_ERROR:g}, such as "
         "{per_m: 0.05, per_rad: 0.05}",
     ),
+    "localization": choice(LOCALIZATIONS),
     "command_timeout": number(at_least=0),
     "controller_period": number(at_least=0),
     "gui": BOOLEAN,

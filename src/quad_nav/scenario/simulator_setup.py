@@ -12,7 +12,7 @@ from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.errors import InputError
 from quad_nav.files.values import is_number, is_whole, optional, unknown_names, value_faults
 from quad_nav.scenario.navigator_parameters import load_navigators
-from quad_nav.scenario.rules import RULES, steps_per_scan
+from quad_nav.scenario.rules import RULES, SIMULATOR, steps_per_scan
 from quad_nav.scenario.scenario import (
     area_of,
     body_radius_m,
@@ -42,6 +42,7 @@ DEFAULTS: Dict[str, Any] = {
     "lidar_rate": 20.0,  # scans per simulated second
     "range_noise": 0.0,  # standard deviation, m
     "odom_drift": {},  # errors of the odometry, by name
+    "localization": SIMULATOR,  # who publishes map -> odom{i}: simulator, or none of its nodes
     "seed": 0,  # for noise, jitter and drift
     "jitter": 0.0,  # radius of the disc in which starts are displaced, m
     "command_timeout": 0.5,  # s; a robot hovers after command_timeout plus
@@ -67,6 +68,7 @@ class SimulatorSetup:
         rate: Simulated seconds per second.
         configurations: Those of the robots whose navigators are in the simulation's processes, by
             number.
+        localizes: The simulator publishes the poses in ``map``, which only it knows.
         hosts: Number of these processes; 0 if nobody chose it.
     """
 
@@ -80,6 +82,7 @@ class SimulatorSetup:
     steps_per_scan: int
     map_resolution_m: float = 0.0
     configurations: Mapping[int, Configuration] = field(default_factory=dict)
+    localizes: bool = True
     hosts: int = 0
 
 
@@ -119,6 +122,7 @@ def read_setup(
         steps_per_scan(values["lidar_rate"]),
         float(values["map_resolution"]),
         hosted,
+        values["localization"] == SIMULATOR,
         values["hosts"],
     )
 
@@ -153,6 +157,11 @@ def _hosted(values: Mapping[str, Any]) -> List[int]:
 
 def _host_faults(values: Mapping[str, Any], name: str) -> List[str]:
     count = len(_hosted(values))
+    if count and values["localization"] != SIMULATOR:
+        # They have their poses from the simulation.
+        return [
+            f"{name}: localization {values['localization']} with composed, expected separate nodes"
+        ]
     if not count or values["hosts"] <= count:
         return []
     return [f"{name}: hosts {values['hosts']} for {count} robots; expected a robot for each host"]

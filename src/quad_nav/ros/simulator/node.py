@@ -83,7 +83,9 @@ class SimulatorNode:
         self._loop = self._fleet.loop
         self._simulation = self._loop.simulation
         others = [i for i in range(setup.robots) if i not in self._fleet.hosted]
-        self._topics = SimulatorTopics(self._simulation, setup.map_resolution_m, others)
+        self._topics = SimulatorTopics(
+            self._simulation, setup.map_resolution_m, setup.localizes, others
+        )
         self._commands = Commands(self._simulation)
         self._meter = RateMeter()
         self._set_rate(setup.rate)

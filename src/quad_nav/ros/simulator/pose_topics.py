@@ -30,9 +30,14 @@ from quad_nav.sim.simulation import Simulation
 class PoseTopics:
     """Publishers of `/tf`, of the states of all quadcopters in one message, and of `/odom{i}`."""
 
-    def __init__(self, simulation: Simulation) -> None:
-        """Advertise the topics, and lay out their messages."""
+    def __init__(self, simulation: Simulation, localizes: bool) -> None:
+        """Advertise the topics, and lay out their messages.
+
+        Without ``localizes`` somebody else publishes `map -> odom{i}`, and no message tells where
+        a quadcopter is in `map`.
+        """
         self._simulation = simulation
+        self._first = 0 if localizes else 1  # of a quadcopter's transforms
         self._drifts = not simulation.params.odom_drift.is_zero
         robots = range(simulation.n_robots)
         frames = [_frames(i) for i in robots]
@@ -42,7 +47,9 @@ class PoseTopics:
             pose_row(Pose3D(0, 0, 0)),
             pose_row(base_from_lidar),
         )
-        self._transform_writer = TransformWriter([pair for pairs in frames for pair in pairs])
+        self._transform_writer = TransformWriter(
+            [pair for pairs in frames for pair in pairs[self._first :]]
+        )
         self._odometry_writers = [OdometryWriter(*pairs[1]) for pairs in frames]
         self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10, latch=True)
         self._odometry = [rospy.Publisher(f"/odom{i}", Odometry, queue_size=10) for i in robots]
@@ -52,9 +59,10 @@ class PoseTopics:
     def _robots_in_bulk(self) -> NDArray[np.int64]:
         """Return the robots whose states are published in one message.
 
-        If odometry or tf is remapped, another node publishes what the others hear of a robot.
+        If odometry or tf is remapped, or somebody else localizes, another node publishes what the
+        others hear of a robot.
         """
-        if self._tf.resolved_name != "/tf":
+        if self._first or self._tf.resolved_name != "/tf":
             return np.zeros(0, np.int64)
         names = [publisher.resolved_name for publisher in self._odometry]
         return np.flatnonzero([name == f"/odom{i}" for i, name in enumerate(names)])
@@ -90,7 +98,8 @@ class PoseTopics:
             for i, pose in enumerate(poses):
                 transforms[i, 0] = pose_row(self._simulation.map_from_frame(f"odom{i}", i).to_3d())
                 transforms[i, 1] = self._in_odom(i, pose)
-        self._tf.publish(self._transform_writer.message(stamp, transforms.reshape(-1, 7)))
+        rows = transforms[:, self._first :].reshape(-1, 7)
+        self._tf.publish(self._transform_writer.message(stamp, rows))
 
     def _in_odom(self, robot: int, map_from_base: Floats) -> Floats:
         """Return the pose of a quadcopter in its odometry frame, float64[7]."""

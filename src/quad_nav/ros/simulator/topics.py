@@ -59,13 +59,18 @@ class SimulatorTopics:
     """
 
     def __init__(
-        self, simulation: Simulation, map_resolution_m: float, scanned: Sequence[int]
+        self,
+        simulation: Simulation,
+        map_resolution_m: float,
+        localizes: bool,
+        scanned: Sequence[int],
     ) -> None:
         """Advertise the topics, and publish the scene and the flight info.
 
         Args:
             simulation: The simulation.
             map_resolution_m: Size of the cells of the scene's map; 0 for no map.
+            localizes: Publish what only a simulation knows: the quadcopters' poses in ``map``.
             scanned: Numbers of the quadcopters whose scans are published here. Where their
                 navigators share the process, their scans come from there.
         """
@@ -73,7 +78,7 @@ class SimulatorTopics:
         robots = range(simulation.n_robots)
         self.lidar_enabled = [True for _ in robots]
         self._lagging_reports = 0
-        self._poses = PoseTopics(simulation)
+        self._poses = PoseTopics(simulation, localizes)
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10, latch=True)
         self._scans = {i: rospy.Publisher(f"/scan{i}", ScanMessage, queue_size=10) for i in scanned}
         self._contacts = rospy.Publisher(CONTACTS_TOPIC, ContactMessage, queue_size=100)
