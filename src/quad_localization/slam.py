@@ -27,6 +27,9 @@ Floats = NDArray[np.float64]
 _ITERATIONS = 4
 _BEAMS = 180
 """Points of a scan that are fitted; more cost time and tell nothing new."""
+_GAP_M = 0.3
+"""Neighbouring ends of beams that are nearer are on one surface. Those further apart, as of beams
+that graze a wall, tell where the beams were rather than where the wall is."""
 _ENOUGH_KNOWN = 0.3
 """Share of a scan that must be on the map to be fitted to it."""
 
@@ -98,8 +101,10 @@ class Slam:
             robot: Number of the robot.
             odom_from_base: Its pose by odometry at the scan's stamp.
             sensor: The LIDAR's position (x_m, y_m) in the robot's frame.
-            points: float64[n, 2], ends of beams in the robot's frame, projected to the ground.
+            points: float64[n, 2], ends of neighbouring beams in the robot's frame, projected to the
+                ground.
         """
+        points, surfaces = on_surfaces(points, self._params.resolution_m)
         place, is_first = self._predicted(robot, odom_from_base), robot not in self.poses
         self.poses[robot] = place
         if not len(points):
@@ -113,7 +118,7 @@ class Slam:
             place.map_from_odom = _pose(found).compose(odom_from_base.inverse())
         else:
             found, place.is_lost = prior, False
-        self._insert(place, _pose(found), sensor, points)
+        self._insert(place, _pose(found), sensor, surfaces)
         return place
 
     def _predicted(self, robot: int, odom_from_base: Pose2D) -> SlamPose:
@@ -177,6 +182,28 @@ class Slam:
                 return
         place.inserted = found
         self.map.insert(np.array(found.transform(*sensor)), found.transform_points(points))
+
+
+def on_surfaces(points: Floats, step_m: float) -> Tuple[Floats, Floats]:
+    """Return the ends of beams that have a near neighbour, and these with the surface between them.
+
+    Args:
+        points: float64[n, 2], ends of beams, in the order of their angles.
+        step_m: Largest distance of points on a surface.
+
+    Returns:
+        float64[m, 2] and float64[k, 2].
+    """
+    if not len(points):
+        return points, points
+    gaps = np.roll(points, -1, axis=0) - points
+    lengths_m = np.hypot(gaps[:, 0], gaps[:, 1])
+    is_surface = lengths_m < _GAP_M
+    steps = np.ceil(lengths_m[is_surface] / step_m).astype(np.int64)
+    starts = np.repeat(np.flatnonzero(is_surface), steps)
+    numbers = np.arange(len(starts)) - np.repeat(np.cumsum(steps) - steps, steps)
+    between = points[starts] + gaps[starts] * (numbers / np.repeat(steps, steps))[:, None]
+    return points[is_surface | np.roll(is_surface, 1)], between
 
 
 def _row(pose: Pose2D) -> Floats:
