@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from quad_localization.growing_map import GrowingMap
 from quad_localization.growing_map_kernel import fit, normal_equations, search
-from quad_nav.geometry import Pose2D, angle_difference
+from quad_nav.costmap.projection import scan_points
+from quad_nav.geometry import Pose2D, Pose3D, Scan, angle_difference
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +31,7 @@ _BEAMS = 180
 _GAP_M = 0.3
 """Neighbouring ends of beams that are nearer are on one surface. Those further apart, as of beams
 that graze a wall, tell where the beams were rather than where the wall is."""
+_SEARCH_M, _SEARCH_RAD = 2.0, 0.5
 _ENOUGH_KNOWN = 0.3
 """Share of a scan that must be on the map to be fitted to it."""
 
@@ -42,8 +44,11 @@ class SlamParams:
         resolution_m: Size of the map's cells.
         odom_per_m: Standard deviation of odometry after 1 m, in m.
         odom_per_rad: Standard deviation of odometry after 1 rad, in rad.
-        start_m: Standard deviation of the start positions.
-        start_rad: Standard deviation of the start headings.
+        start_m: Standard deviation of the positions of the odometry frames at the start.
+        start_rad: Standard deviation of their headings.
+        peer_m: Radius around a peer in which beams end on it, and are left out.
+        band_m: Height above and below the LIDAR in which ends of beams count: a quadcopter tilts,
+            and its beams may hit the floor.
         insert_m: Way after which a scan is inserted.
         insert_rad: Turn after which a scan is inserted.
         lost_below: Mean occupancy at the ends of beams below which the robot is lost.
@@ -54,6 +59,8 @@ class SlamParams:
     odom_per_rad: float = 0.1
     start_m: float = 0.15
     start_rad: float = 0.05
+    peer_m: float = 0.6
+    band_m: float = 0.3
     insert_m: float = 0.2
     insert_rad: float = 0.2
     lost_below: float = 0.4
@@ -86,27 +93,29 @@ class Slam:
         poses: The robots' places by number, after their first scans.
     """
 
-    def __init__(self, starts: Dict[int, Pose2D], params: SlamParams = SlamParams()) -> None:
-        """Start with an empty map; ``starts`` are roughly the poses in ``map`` at first."""
-        self._params, self._starts = params, starts
+    def __init__(self, frames: Dict[int, Pose2D], params: SlamParams = SlamParams()) -> None:
+        """Start with an empty map; ``frames`` are roughly the odometry frames in ``map``."""
+        self._params, self._frames = params, frames
         self.map = GrowingMap(params.resolution_m)
         self.poses: Dict[int, SlamPose] = {}
 
     def add_scan(
-        self, robot: int, odom_from_base: Pose2D, sensor: Tuple[float, float], points: Floats
+        self, robot: int, scan: Scan, odom_from_base: Pose2D, odom_from_lidar: Pose3D
     ) -> SlamPose:
         """Find a robot's place by a scan, and let the map grow.
 
         Args:
             robot: Number of the robot.
-            odom_from_base: Its pose by odometry at the scan's stamp.
-            sensor: The LIDAR's position (x_m, y_m) in the robot's frame.
-            points: float64[n, 2], ends of neighbouring beams in the robot's frame, projected to the
-                ground.
+            scan: The scan.
+            odom_from_base: The robot's pose by odometry at the scan's stamp.
+            odom_from_lidar: Its LIDAR's pose.
         """
-        points, surfaces = on_surfaces(points, self._params.resolution_m)
         place, is_first = self._predicted(robot, odom_from_base), robot not in self.poses
         self.poses[robot] = place
+        in_odom = self._points(robot, scan, odom_from_lidar)
+        points, surfaces = on_surfaces(
+            odom_from_base.inverse_transform_points(in_odom), self._params.resolution_m
+        )
         if not len(points):
             place.fit, place.is_lost = 0.0, True
             return place
@@ -118,14 +127,35 @@ class Slam:
             place.map_from_odom = _pose(found).compose(odom_from_base.inverse())
         else:
             found, place.is_lost = prior, False
+        sensor = odom_from_base.inverse_transform(odom_from_lidar.x_m, odom_from_lidar.y_m)
         self._insert(place, _pose(found), sensor, surfaces)
         return place
+
+    def set_pose(self, robot: int, map_from_base: Pose2D) -> None:
+        """Tell where a robot roughly is, as a person sees it; its next scan finds the place."""
+        place = self.poses.pop(robot, None)
+        if place is not None and place.odom_from_base is not None:
+            self._frames[robot] = map_from_base.compose(place.odom_from_base.inverse())
+
+    def _points(self, robot: int, scan: Scan, odom_from_lidar: Pose3D) -> Floats:
+        """Return the ends of beams float64[n, 2] in the odometry frame, without those on peers."""
+        params, height_m = self._params, odom_from_lidar.z_m
+        map_from_odom, circles = self.poses[robot].map_from_odom, []
+        for number, peer in self.poses.items():
+            if number != robot and peer.odom_from_base is not None:
+                here = peer.map_from_odom.compose(peer.odom_from_base)
+                place = map_from_odom.inverse_transform(here.x_m, here.y_m)
+                circles.append((*place, params.peer_m))
+        heights_m = height_m - params.band_m, height_m + params.band_m
+        excluded = np.array(circles).reshape(-1, 3)
+        points = scan_points(scan, False, odom_from_lidar, heights_m, excluded)
+        return points[:, :2].astype(np.float64)
 
     def _predicted(self, robot: int, odom_from_base: Pose2D) -> SlamPose:
         """Return a robot's place by odometry alone, its covariance grown by the way."""
         params, place = self._params, self.poses.get(robot)
         if place is None or place.odom_from_base is None:
-            map_from_odom = self._starts[robot].compose(odom_from_base.inverse())
+            map_from_odom = self._frames[robot]
             deviations = params.start_m, params.start_m, params.start_rad
             place = SlamPose(map_from_odom, np.diag(np.square(deviations)))
         else:
@@ -159,9 +189,13 @@ class Slam:
         return found
 
     def _searched(self, prior: Floats, place: SlamPose, points: Floats) -> Floats:
-        """Return the best of the poses around one, within two standard deviations of it."""
+        """Return the best of the poses around one, within two standard deviations of it.
+
+        A robot that is lost for long is not searched in the whole map: that takes time.
+        """
         view = self.map.views[-1]
-        reach_m, reach_rad = 2.0 * np.sqrt(np.diag(place.covariance))[[0, 2]]
+        deviations = np.sqrt(np.diag(place.covariance))
+        reach_m, reach_rad = np.minimum(2.0 * deviations[[0, 2]], (_SEARCH_M, _SEARCH_RAD))
         steps = np.arange(-reach_m, reach_m + view.resolution_m, view.resolution_m)
         turns = np.arange(-reach_rad, reach_rad + 0.05, 0.05)
         offsets = np.stack(np.meshgrid(steps, steps, turns, indexing="ij"), axis=-1)

@@ -10,7 +10,7 @@ import pytest
 from quad_localization.growing_map import GrowingMap
 from quad_localization.slam import Slam, SlamParams
 from quad_nav.files.shipped import shipped
-from quad_nav.geometry import Pose2D, quaternion_from_yaw
+from quad_nav.geometry import Pose2D, Pose3D, Scan, quaternion_from_yaw
 from quad_nav.grid import GridSpec
 from quad_nav.scenario.scene_map import scene_occupancy
 from quad_nav.sim.casters import kernel_lidars
@@ -18,8 +18,6 @@ from quad_nav.sim.flight import BodyState
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.odometry import Odometry, OdometryErrors
 from quad_nav.sim.scene_file import load_scene
-
-SENSOR = (0.0, 0.0)
 
 
 class Ways:
@@ -49,16 +47,19 @@ class Ways:
         """Return its true pose."""
         return Pose2D(*self.poses[robot].tolist())
 
-    def points(self, robot):
-        """Return the ends of its beams."""
+    def add_scan(self, slam, robot):
+        """Hand a scan of a robot's LIDAR to ``slam``."""
         rows = np.zeros((len(self.poses), 13))
         rows[:, :2], rows[:, 2] = self.poses[:, :2], self.scene.altitude_m
         rows[:, 3:7] = [quaternion_from_yaw(yaw) for yaw in self.poses[:, 2]]
         scan = self._lidars.scan(BodyState(rows), [robot], self._now_s)[0]
-        ranges_m = np.asarray(scan.ranges_m, float)
-        angles = scan.angle_min_rad + scan.angle_increment_rad * np.arange(len(ranges_m))
-        ends = ranges_m[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        return ends[np.isfinite(ranges_m)]
+        here = self.odom(robot)
+        return slam.add_scan(robot, scan, here, lidar_at(here))
+
+
+def lidar_at(pose):
+    """Return the pose of a LIDAR above a pose of its robot."""
+    return Pose3D(pose.x_m, pose.y_m, 1.0, quaternion_from_yaw(pose.yaw_rad))
 
 
 def error(slam, ways, robot):
@@ -73,7 +74,7 @@ def along(slam, ways, robot, way, steps=60):
     worst = np.zeros(2)
     for _ in range(steps):
         ways.move(robot, *(part / steps for part in way))
-        slam.add_scan(robot, ways.odom(robot), SENSOR, ways.points(robot))
+        ways.add_scan(slam, robot)
         worst = np.maximum(worst, error(slam, ways, robot))
     return worst
 
@@ -88,8 +89,8 @@ ERRORS = OdometryErrors(per_m=0.1, per_rad=0.1, turn=0.02)
 
 def test_a_pose_is_kept_on_a_way_on_which_odometry_drifts(arena):
     ways = Ways(arena, [(1.0, 2.0, 0.0)], ERRORS, noise_m=0.02)
-    slam = Slam({0: ways.true(0)})
-    slam.add_scan(0, ways.odom(0), SENSOR, ways.points(0))
+    slam = Slam({0: Pose2D(0.0, 0.0)})
+    ways.add_scan(slam, 0)
     for way in ((0.0, 8.0, 1.0), (5.0, 0.5, -2.0), (-5.0, -0.5, 2.0), (0.0, -8.0, -1.0)):
         worst_m, worst_rad = along(slam, ways, 0, way)
         assert worst_m < 0.1 and worst_rad < 0.03
@@ -100,8 +101,8 @@ def test_a_pose_is_kept_on_a_way_on_which_odometry_drifts(arena):
 def test_the_map_is_that_of_the_scene(arena):
     """Every occupied cell is within a cell of a surface, apart from those of grazing beams."""
     ways = Ways(arena, [(1.0, 2.0, 0.0)], ERRORS)
-    slam = Slam({0: ways.true(0)})
-    slam.add_scan(0, ways.odom(0), SENSOR, ways.points(0))
+    slam = Slam({0: Pose2D(0.0, 0.0)})
+    ways.add_scan(slam, 0)
     along(slam, ways, 0, (0.0, 8.0, 1.0))
     grid = slam.map.grid()
     height, width = grid.occupancy.shape
@@ -116,10 +117,11 @@ def test_the_map_is_that_of_the_scene(arena):
 
 def test_a_second_robot_finds_its_place_in_the_map_of_the_first(arena):
     """Its start pose is known to 0.14 m and 0.04 rad."""
+    off = Pose2D(10.1, 1.9, math.pi + 0.04).compose(Pose2D(10.0, 2.0, math.pi).inverse())
     ways = Ways(arena, [(1.0, 2.0, 0.0), (10.0, 2.0, math.pi)], ERRORS)
-    slam = Slam({0: ways.true(0), 1: Pose2D(10.1, 1.9, math.pi + 0.04)})
-    slam.add_scan(0, ways.odom(0), SENSOR, ways.points(0))
-    slam.add_scan(1, ways.odom(1), SENSOR, ways.points(1))
+    slam = Slam({0: Pose2D(0.0, 0.0), 1: off})
+    ways.add_scan(slam, 0)
+    ways.add_scan(slam, 1)
     assert along(slam, ways, 0, (0.0, 6.0, 1.0))[0] < 0.1
     along(slam, ways, 1, (0.0, 3.0, 1.0), 30)
     assert max(error(slam, ways, 1)) < 0.06
@@ -130,8 +132,8 @@ def test_along_a_corridor_the_way_is_that_of_odometry(tmp_path):
     scene = tmp_path / "corridor.yaml"
     scene.write_text("size: [200.0, 3.0]\naltitude: 1.0\nstarts: [[100.0, 1.5, 0.0]]\n")
     ways = Ways(load_scene(scene), [(100.0, 1.5, 0.0)], OdometryErrors(turn=0.02))
-    slam = Slam({0: ways.true(0)})
-    slam.add_scan(0, ways.odom(0), SENSOR, ways.points(0))
+    slam = Slam({0: Pose2D(0.0, 0.0)})
+    ways.add_scan(slam, 0)
     along(slam, ways, 0, (5.0, 0.0, 0.0))
     found = slam.poses[0].map_from_odom.compose(ways.odom(0))
     assert found.x_m == pytest.approx(105.0, abs=0.15)
@@ -142,19 +144,44 @@ def test_along_a_corridor_the_way_is_that_of_odometry(tmp_path):
 
 def test_a_robot_that_was_carried_away_is_lost_and_does_not_spoil_the_map(arena):
     ways = Ways(arena, [(1.0, 2.0, 0.0)], OdometryErrors())
-    slam = Slam({0: ways.true(0)})
+    slam = Slam({0: Pose2D(0.0, 0.0)})
     along(slam, ways, 0, (0.0, 6.0, 0.0))
     before = slam.map.grid().occupancy
-    ways.poses = ways.poses + (7.0, 1.0, 2.0)
-    ways.odometry = Odometry(OdometryErrors(), np.array([[1.0, 8.0, 0.0]]), 0.0, 0)
-    lost = slam.add_scan(0, Pose2D(1.0, 8.0, 0.0), SENSOR, ways.points(0))
+    carried = Ways(arena, [(8.0, 9.0, 2.0)], OdometryErrors())
+    carried.odom = lambda robot: Pose2D(1.0, 8.0)
+    lost = carried.add_scan(slam, 0)
     assert lost.is_lost and lost.fit < SlamParams().lost_below
     assert np.array_equal(slam.map.grid().occupancy, before)
+    slam.set_pose(0, Pose2D(8.1, 8.9, 2.05))
+    found = carried.add_scan(slam, 0)
+    assert not found.is_lost
+    assert found.map_from_odom.compose(Pose2D(1.0, 8.0)).distance_to(carried.true(0)) < 0.1
+
+
+def test_beams_that_end_on_a_peer_leave_no_trace(tmp_path):
+    """Two robots face each other for a while, and one of them leaves."""
+    scene = tmp_path / "room.yaml"
+    scene.write_text(
+        "size: [8.0, 8.0]\naltitude: 1.0\nstarts: [[3.0, 4.0, 0.0], [5.0, 4.0, 0.0]]\n"
+    )
+    ways = Ways(load_scene(scene), [(3.0, 4.0, 0.0), (5.0, 4.0, 0.0)], OdometryErrors())
+    slam = Slam({0: Pose2D(0.0, 0.0), 1: Pose2D(0.0, 0.0)})
+    ways.add_scan(slam, 1)
+    for _ in range(5):
+        ways.move(0, 0.0, 0.3, 0.0)
+        ways.add_scan(slam, 0)
+    grid = slam.map.grid()
+    columns, rows = (
+        [round((c + d - o) / 0.05) for d in (-0.5, 0.5)]
+        for c, o in ((5.0, grid.origin.x_m), (4.0, grid.origin.y_m))
+    )
+    assert grid.occupancy[slice(*rows), slice(*columns)].max() < 100
 
 
 def test_a_scan_without_points_loses_the_robot(arena):
     slam = Slam({0: Pose2D(1.0, 2.0, 0.5)})
-    place = slam.add_scan(0, Pose2D(0.0, 0.0), SENSOR, np.zeros((0, 2)))
+    empty = Scan(0.0, 0.0, 0.1, 0.02, 60.0, np.full(3, np.inf, np.float32))
+    place = slam.add_scan(0, empty, Pose2D(0.0, 0.0), lidar_at(Pose2D(0.0, 0.0)))
     assert (place.is_lost, place.map_from_odom) == (True, Pose2D(1.0, 2.0, 0.5))
 
 

@@ -42,7 +42,7 @@ DEFAULTS: Dict[str, Any] = {
     "lidar_rate": 20.0,  # scans per simulated second
     "range_noise": 0.0,  # standard deviation, m
     "odom_drift": {},  # errors of the odometry, by name
-    "localization": SIMULATOR,  # who publishes map -> odom{i}: simulator, or none of its nodes
+    "localization": SIMULATOR,  # who publishes map -> odom{i}
     "seed": 0,  # for noise, jitter and drift
     "jitter": 0.0,  # radius of the disc in which starts are displaced, m
     "command_timeout": 0.5,  # s; a robot hovers after command_timeout plus

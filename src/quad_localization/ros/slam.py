@@ -1,0 +1,199 @@
+"""Node `slam`: localize all robots of a flight by their scans, and publish the map that they make.
+
+Callbacks store; one loop hands the scans to ``Slam``, as soon as the odometry at their stamps is
+known. Each scan gives a transform `map -> odom{i}`.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import Deque, Dict, List, Optional, Tuple
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import PoseWithCovariance, PoseWithCovarianceStamped
+from nav_msgs.msg import OccupancyGrid
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+
+from quad_localization.ros.map_messages import grid_message
+from quad_localization.slam import Slam, SlamPose
+from quad_nav.errors import excerpt
+from quad_nav.files.values import is_number, is_whole
+from quad_nav.geometry import Pose2D
+from quad_nav.ros.common.conversions import (
+    ScanMessage,
+    pose_from_message,
+    pose_message,
+    scan_from_message,
+    transform_message,
+)
+from quad_nav.ros.common.diagnostics import ThrottledWarnings, publish_health
+from quad_nav.ros.common.readiness import init_node
+from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
+from quad_nav.topics.health import Health, Level
+from quad_nav.topics.validation import scan_problem, stamp_problem
+
+EXIT_BAD_INPUT = 2
+MAP_PERIOD_S = 1.0
+TOLERANCE_S = 0.1
+"""Transforms are stamped ahead by so much, as those of amcl: they hold until the next scan."""
+_POLL_S = 0.01
+_QUEUE = 10
+
+
+class SlamRobot:
+    """Topics and waiting scans of one robot."""
+
+    def __init__(self, number: int) -> None:
+        self.number, self.name = number, f"quad{number}"
+        self.odom, self.base = f"odom{number}", f"base_link{number}"
+        self.scans: Deque[LaserScan] = deque(maxlen=_QUEUE)
+        self.warnings = ThrottledWarnings()
+        self.pose: Optional[Tuple[Pose2D, str]] = None  # that a person gave
+        self.publisher = rospy.Publisher(
+            f"/slam_pose{number}", PoseWithCovarianceStamped, queue_size=1
+        )
+        self._subscribers = [
+            rospy.Subscriber(f"/scan{number}", ScanMessage, self._on_scan, queue_size=_QUEUE),
+            rospy.Subscriber(
+                f"/initialpose{number}", PoseWithCovarianceStamped, self._on_pose, queue_size=1
+            ),
+        ]
+
+    def _on_scan(self, message: LaserScan) -> None:
+        problem = stamp_problem(message.header.stamp.to_sec(), rospy.get_time())
+        problem = problem or scan_problem(scan_from_message(message))
+        if problem:
+            self.warnings.warn(f"{self.name}: /scan{self.number}: message dropped: {problem}")
+        else:
+            self.scans.append(message)
+
+    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        pose = pose_from_message(message.pose.pose)
+        if not np.isfinite([*pose.translation, *pose.quaternion]).all():
+            self.warnings.warn(f"{self.name}: initial pose dropped: it is not finite")
+            return
+        self.pose = pose.to_2d(), message.header.frame_id
+
+
+class SlamNode:
+    """The node: robots, map and transforms."""
+
+    def __init__(self, robots: int, frames: Dict[int, Pose2D]) -> None:
+        self._slam = Slam(frames)
+        self._lock = threading.Lock()  # the diagnostics have their own thread
+        self._robots = [SlamRobot(number) for number in range(robots)]
+        self._transforms = Transforms()
+        self._tf = rospy.Publisher("/tf", TFMessage, queue_size=100)
+        self._map = rospy.Publisher("/map", OccupancyGrid, queue_size=1, latch=True)
+        self._map_s, self._now_s = -MAP_PERIOD_S, 0.0
+        publish_health(self._health)
+
+    def spin(self) -> None:
+        """Run until ROS shuts down."""
+        while not rospy.is_shutdown():
+            self._check_clock()
+            for robot in self._robots:
+                with self._lock:
+                    self._set_pose(robot)
+                    while robot.scans and self._take(robot, robot.scans[0]):
+                        robot.scans.popleft()
+            self._publish_map()
+            rospy.rostime.wallsleep(_POLL_S)
+
+    def _check_clock(self) -> None:
+        """Forget the scans of a time that comes again."""
+        before_s, self._now_s = self._now_s, rospy.get_time()
+        if self._now_s < before_s:
+            for robot in self._robots:
+                robot.scans.clear()
+            self._map_s = self._now_s - MAP_PERIOD_S
+
+    def _take(self, robot: SlamRobot, message: LaserScan) -> bool:
+        """Hand a scan to the map; return False while its odometry may still come."""
+        stamp = message.header.stamp
+        try:
+            odom_from_base = self._transforms.lookup(robot.odom, robot.base, stamp)
+            odom_from_lidar = self._transforms.lookup(robot.odom, message.header.frame_id, stamp)
+        except TransformUnavailable as error:
+            if error.later and len(robot.scans) < _QUEUE:
+                return False
+            reason = excerpt(str(error))
+            robot.warnings.warn(f"{robot.name}: /scan{robot.number}: message dropped: {reason}")
+            return True
+        scan, base = scan_from_message(message), odom_from_base.to_2d()
+        place = self._slam.add_scan(robot.number, scan, base, odom_from_lidar)
+        self._publish(robot, place, stamp)
+        return True
+
+    def _publish(self, robot: SlamRobot, place: SlamPose, stamp: rospy.Time) -> None:
+        """Publish a robot's place; without it, the navigator of a robot that is lost stops."""
+        if place.is_lost:
+            return
+        ahead = stamp + rospy.Duration(TOLERANCE_S)
+        frame = transform_message(place.map_from_odom.to_3d(), "map", robot.odom, ahead)
+        self._tf.publish(TFMessage([frame]))
+        if place.odom_from_base is not None:
+            here = place.map_from_odom.compose(place.odom_from_base).to_3d()
+            covariance = np.zeros((6, 6))
+            covariance[np.ix_((0, 1, 5), (0, 1, 5))] = place.covariance
+            pose = PoseWithCovariance(pose_message(here), covariance.ravel().tolist())
+            robot.publisher.publish(PoseWithCovarianceStamped(Header(0, stamp, "map"), pose))
+
+    def _set_pose(self, robot: SlamRobot) -> None:
+        """Take the pose that a person gave."""
+        given, robot.pose = robot.pose, None
+        if given is None:
+            return
+        pose, frame = given
+        if frame.lstrip("/") != "map":
+            text = f"{robot.name}: initial pose dropped: in frame '{excerpt(frame)}', expected map"
+            robot.warnings.warn(text, "frame")
+            return
+        self._slam.set_pose(robot.number, pose)
+
+    def _publish_map(self) -> None:
+        if self._slam.map.is_empty or self._now_s - self._map_s < MAP_PERIOD_S:
+            return
+        self._map_s = self._now_s
+        message = grid_message(self._slam.map.grid(), "map")
+        message.header.stamp = message.info.map_load_time = rospy.Time(self._now_s)
+        self._map.publish(message)
+
+    def _health(self) -> List[Health]:
+        with self._lock:
+            return [_health_of(one.name, self._slam.poses.get(one.number)) for one in self._robots]
+
+
+def _health_of(name: str, place: Optional[SlamPose]) -> Health:
+    part = "slam: localization"
+    if place is None:
+        return Health(part, name, Level.WARN, "no scan with odometry yet")
+    across_m = float(np.sqrt(place.covariance[:2, :2].trace()))
+    values = {"fit": f"{place.fit:.2f}", "standard deviation": f"{across_m:.3f} m"}
+    if place.is_lost:
+        return Health(part, name, Level.ERROR, "lost: scans do not fit the map", values)
+    return Health(part, name, Level.OK, "localized", values)
+
+
+def main() -> int:
+    """Run the node; return 0, or 2 if a parameter is not valid."""
+    init_node("slam")
+    robots = rospy.get_param("~robots", 2)
+    if not is_whole(robots) or robots < 1:
+        rospy.logfatal("slam: robots: %s; expected a whole number, at least 1", robots)
+        return EXIT_BAD_INPUT
+    frames = {}
+    for number in range(robots):
+        given = rospy.get_param(f"~odom{number}", [0.0, 0.0, 0.0])
+        if not isinstance(given, list) or len(given) != 3 or not all(map(is_number, given)):
+            rospy.logfatal(
+                "slam: odom%d: %s; expected its first pose in map, [x, y, yaw]", number, given
+            )
+            return EXIT_BAD_INPUT
+        frames[number] = Pose2D(*map(float, given))
+    SlamNode(robots, frames).spin()
+    return 0
