@@ -2,6 +2,7 @@
 """`map_server` and `map_saver`: a scene's map is published, saved, and loaded cell for cell."""
 
 import subprocess
+import sys
 import tempfile
 import unittest
 from pathlib import Path
@@ -36,7 +37,9 @@ class MapServer(unittest.TestCase):
     def test_2_a_saved_map_is_loaded_again_cell_for_cell(self):
         before = rospy.wait_for_message("/map", OccupancyGrid, WAIT_S)
         subprocess.run(
-            ["rosrun", "quad", "map_saver", "-f", str(self.stem)], check=True, timeout=WAIT_S
+            [sys.executable, "-m", "quad_localization.ros.map_saver", "-f", str(self.stem)],
+            check=True,
+            timeout=WAIT_S,
         )
         change = rospy.ServiceProxy("/change_map", LoadMap)
         answer = change(f"{self.stem}.yaml")
@@ -58,5 +61,5 @@ class MapServer(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("test_map_server")
-    rostest.rosrun("quad", "map_server", MapServer)
+    rospy.init_node("map_files")
+    rostest.rosrun("quad", "map_files", MapServer)

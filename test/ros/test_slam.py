@@ -7,7 +7,7 @@ import numpy as np
 import rospy
 import rostest
 import tf2_ros
-from flight_case import FlightCase
+from flight_case import FlightCase, Record
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
@@ -22,8 +22,8 @@ class SlamFlight(FlightCase):
     def test_mission(self):
         buffer = tf2_ros.Buffer()
         self.listener = tf2_ros.TransformListener(buffer)
-        poses = [self.record(f"/slam_pose{i}", PoseWithCovarianceStamped) for i in (0, 1)]
-        maps = self.record("/map", OccupancyGrid)
+        poses = [Record(f"/slam_pose{i}", PoseWithCovarianceStamped) for i in (0, 1)]
+        maps = Record("/map", OccupancyGrid)
         result = self.read_result(rospy.get_param("~result"), patience_s=380.0)
         goals = [goal for robot in result["robots"] for goal in robot["goals"]]
         self.assertEqual([goal["reached"] for goal in goals], 6 * [True], goals)
@@ -48,4 +48,4 @@ class SlamFlight(FlightCase):
 
 
 if __name__ == "__main__":
-    rostest.rosrun("quad", "slam", SlamFlight)
+    rostest.rosrun("quad", "slam_flight", SlamFlight)

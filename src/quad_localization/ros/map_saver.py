@@ -44,3 +44,7 @@ def main() -> int:
     rospy.loginfo("map_saver: %s.pgm and %s.yaml are written", given.stem, given.stem)
     rospy.signal_shutdown("the map is saved")
     return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

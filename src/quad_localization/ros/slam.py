@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from typing import Deque, Dict, List, Optional, Tuple
+from typing import Callable, Deque, Dict, List, Optional, Tuple
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import PoseWithCovariance, PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseWithCovariance, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
@@ -20,7 +20,9 @@ from tf2_msgs.msg import TFMessage
 
 from quad_localization.ros.map_messages import grid_message
 from quad_localization.slam import Slam, SlamPose
+from quad_localization.warm_up import localize
 from quad_nav.errors import excerpt
+from quad_nav.files.kernel_cache import COMPILING, announced
 from quad_nav.files.values import is_number, is_whole
 from quad_nav.geometry import Pose2D
 from quad_nav.ros.common.conversions import (
@@ -51,6 +53,7 @@ class SlamRobot:
         self.number, self.name = number, f"quad{number}"
         self.odom, self.base = f"odom{number}", f"base_link{number}"
         self.scans: Deque[LaserScan] = deque(maxlen=_QUEUE)
+        self.taken_s = -1.0  # stamp of the last scan that was taken
         self.warnings = ThrottledWarnings()
         self.pose: Optional[Tuple[Pose2D, str]] = None  # that a person gave
         self.publisher = rospy.Publisher(
@@ -64,7 +67,10 @@ class SlamRobot:
         ]
 
     def _on_scan(self, message: LaserScan) -> None:
-        problem = stamp_problem(message.header.stamp.to_sec(), rospy.get_time())
+        stamp_s = message.header.stamp.to_sec()
+        if stamp_s == self.taken_s:
+            return  # a simulation that is paused repeats its scans
+        problem = stamp_problem(stamp_s, rospy.get_time())
         problem = problem or scan_problem(scan_from_message(message))
         if problem:
             self.warnings.warn(f"{self.name}: /scan{self.number}: message dropped: {problem}")
@@ -79,6 +85,20 @@ class SlamRobot:
         self.pose = pose.to_2d(), message.header.frame_id
 
 
+class LatestTransforms(rospy.SubscribeListener):
+    """Sends a node that subscribes the latest transforms: a paused simulation sends no others."""
+
+    def __init__(self) -> None:
+        self.by_frame: Dict[str, TransformStamped] = {}
+
+    def peer_subscribe(
+        self, _name: str, _publish: Callable[..., None], peer_publish: Callable[..., None]
+    ) -> None:
+        """Handle a new subscriber."""
+        if self.by_frame:
+            peer_publish(TFMessage(list(self.by_frame.values())))
+
+
 class SlamNode:
     """The node: robots, map and transforms."""
 
@@ -87,7 +107,8 @@ class SlamNode:
         self._lock = threading.Lock()  # the diagnostics have their own thread
         self._robots = [SlamRobot(number) for number in range(robots)]
         self._transforms = Transforms()
-        self._tf = rospy.Publisher("/tf", TFMessage, queue_size=100)
+        self._latest = LatestTransforms()
+        self._tf = rospy.Publisher("/tf", TFMessage, self._latest, queue_size=100)
         self._map = rospy.Publisher("/map", OccupancyGrid, queue_size=1, latch=True)
         self._map_s, self._now_s = -MAP_PERIOD_S, 0.0
         publish_health(self._health)
@@ -124,6 +145,9 @@ class SlamNode:
             reason = excerpt(str(error))
             robot.warnings.warn(f"{robot.name}: /scan{robot.number}: message dropped: {reason}")
             return True
+        if stamp.to_sec() == robot.taken_s:
+            return True
+        robot.taken_s = stamp.to_sec()
         scan, base = scan_from_message(message), odom_from_base.to_2d()
         place = self._slam.add_scan(robot.number, scan, base, odom_from_lidar)
         self._publish(robot, place, stamp)
@@ -135,6 +159,7 @@ class SlamNode:
             return
         ahead = stamp + rospy.Duration(TOLERANCE_S)
         frame = transform_message(place.map_from_odom.to_3d(), "map", robot.odom, ahead)
+        self._latest.by_frame[robot.odom] = frame
         self._tf.publish(TFMessage([frame]))
         if place.odom_from_base is not None:
             here = place.map_from_odom.compose(place.odom_from_base).to_3d()
@@ -169,7 +194,7 @@ class SlamNode:
 
 
 def _health_of(name: str, place: Optional[SlamPose]) -> Health:
-    part = "slam: localization"
+    part = f"{name}: localization"
     if place is None:
         return Health(part, name, Level.WARN, "no scan with odometry yet")
     across_m = float(np.sqrt(place.covariance[:2, :2].trace()))
@@ -182,6 +207,8 @@ def _health_of(name: str, place: Optional[SlamPose]) -> Health:
 def main() -> int:
     """Run the node; return 0, or 2 if a parameter is not valid."""
     init_node("slam")
+    with announced(lambda: rospy.loginfo("%s", COMPILING)):
+        localize()
     robots = rospy.get_param("~robots", 2)
     if not is_whole(robots) or robots < 1:
         rospy.logfatal("slam: robots: %s; expected a whole number, at least 1", robots)
