@@ -13,7 +13,15 @@ import pytest
 from source_imports import SOURCES, imported_names, package_of
 
 CORE = "quad_nav"
-ADD_ONS = ("quad_moving", "quad_vehicles", "quad_web", "quad_tune", "quad_bench", "quad_rl")
+ADD_ONS = (
+    "quad_moving",
+    "quad_localization",
+    "quad_vehicles",
+    "quad_web",
+    "quad_tune",
+    "quad_bench",
+    "quad_rl",
+)
 
 # A unit (a module or a package directly in the core) imports itself and units of the rows above.
 # Add-ons import the core and themselves.

@@ -1,0 +1,22 @@
+"""Localise a robot on a known map by its LIDAR and drifting odometry: amcl.
+
+Reading order: ``localizer`` (the node without ROS), ``particle_filter`` with ``histogram``,
+``cluster_statistics`` and ``covariance_axes``; ``odometry_models``; ``laser`` with
+``laser_models``, ``scan_beams``, ``likelihood_field`` and ``occupancy_map``; ``parameters``.
+"""
+
+from __future__ import annotations
+
+from quad_localization.localizer import Amcl, Observation, PoseEstimate, Update
+from quad_localization.occupancy_map import OccupancyMap
+from quad_localization.parameters import AmclParams, read_params
+
+__all__ = [
+    "Amcl",
+    "AmclParams",
+    "Observation",
+    "OccupancyMap",
+    "PoseEstimate",
+    "Update",
+    "read_params",
+]
