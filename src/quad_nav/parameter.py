@@ -21,7 +21,7 @@ import enum
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, TypeVar, cast
+from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, TypeVar, Union, cast
 
 _PARAMETER, _UPSTREAM = "parameter", "upstream"  # keys of a field's metadata
 _Params = TypeVar("_Params")
@@ -43,7 +43,7 @@ class Choice:
     """Value of an enumeration, as dynamic_reconfigure shows it."""
 
     name: str
-    value: int
+    value: Union[int, str]
     description: str
 
 

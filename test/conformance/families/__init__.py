@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Callable, Dict, List
 
 from families import (
+    amcl,
+    amcl_sequence,
     carrot_planner,
     defaults,
     dwa,
@@ -41,6 +43,11 @@ FAMILIES: Dict[str, Check] = {
     "dwa": dwa.check,
     "global_planner": global_planner.check,
     "carrot_planner": carrot_planner.check,
+    "amcl_likelihood_field": amcl.check_field,
+    "amcl_sensor": amcl.check_sensor,
+    "amcl_motion": amcl.check_motion,
+    "amcl_filter": amcl.check_filter,
+    "amcl_sequence": amcl_sequence.check,
 }
 DATA = Path(__file__).resolve().parents[1] / "data"
 

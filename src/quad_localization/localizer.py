@@ -1,0 +1,295 @@
+"""Adaptive Monte Carlo localisation of one robot: odometry and scans in, pose and transform out.
+
+``Amcl`` is the node without ROS. Calls come in the order of events; times are the caller's.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Dict, Optional, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_localization.laser import Laser
+from quad_localization.likelihood_field import LikelihoodField, likelihood_field
+from quad_localization.occupancy_map import OccupancyMap
+from quad_localization.odometry_models import angle_difference, move_diff, move_omni
+from quad_localization.parameters import BEAM, AmclParams
+from quad_localization.particle_filter import ParticleFilter
+from quad_localization.random_numbers import seeded
+from quad_localization.scan_beams import Beams, beams_of, tilted_yaw
+from quad_nav.geometry import Pose2D, Pose3D, Scan
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PoseEstimate:
+    """A pose in the map and its covariance.
+
+    Attributes:
+        pose: The pose.
+        covariance: float64[3, 3] of x, y in metres and yaw in radians.
+    """
+
+    pose: Pose2D
+    covariance: Floats
+
+
+@dataclass(frozen=True)
+class Observation:
+    """A scan, and where the robot was.
+
+    Attributes:
+        laser: Name of the laser: the scan's frame.
+        scan: The scan.
+        base_from_laser: Mount of the laser.
+        odom_from_base: Pose by odometry at the stamp of the scan.
+        is_left_out: bool[n], beams that count as not measured, such as those on peers.
+    """
+
+    laser: str
+    scan: Scan
+    base_from_laser: Pose3D
+    odom_from_base: Pose3D
+    is_left_out: Optional[NDArray[np.bool_]] = None
+
+
+@dataclass(frozen=True)
+class Update:
+    """What a scan did.
+
+    Attributes:
+        moved: Whether the particles moved with the odometry.
+        is_weighed: Whether the scan weighed them.
+        is_resampled: Whether they were resampled.
+        estimate: A new estimate; None between.
+        shows_cloud: Whether the particles are to be published.
+        map_from_odom: The latest transform; None before the first estimate.
+    """
+
+    moved: bool = False
+    is_weighed: bool = False
+    is_resampled: bool = False
+    estimate: Optional[PoseEstimate] = None
+    shows_cloud: bool = False
+    map_from_odom: Optional[Pose3D] = None
+
+
+class Amcl:
+    """Localisation of one robot.
+
+    Attributes:
+        params: Parameters in force.
+        particles: The particle filter, None before the first map.
+        estimate: Latest estimate, None before the first.
+        map_from_odom: Latest transform.
+        is_update_requested: Whether the next scan updates without motion.
+        update_count: Updates since the last initialisation.
+    """
+
+    def __init__(self, params: AmclParams, seed: int) -> None:
+        """Start without a map; upstream's seeds are the numbers of its initialisations."""
+        self.params = params
+        self.particles: Optional[ParticleFilter] = None
+        self.estimate: Optional[PoseEstimate] = None
+        self.map_from_odom: Optional[Pose3D] = None
+        self.is_update_requested = False
+        self.update_count = 0
+        self._random = seeded(seed)
+        self._spreads = 0
+        self._grid: Optional[OccupancyMap] = None
+        self._field: Optional[LikelihoodField] = None
+        self._lasers: Dict[str, Laser] = {}
+        self._given: Optional[PoseEstimate] = None  # before the map
+        self._has_begun = False  # since the last initialisation
+        self._odometry = Pose2D(0.0, 0.0)  # at the last update
+
+    def set_map(self, grid: OccupancyMap, initial: PoseEstimate) -> None:
+        """Take a map, and begin at a pose, or at the one that was given before.
+
+        A further map leaves a robot that is localised where it is. Upstream begins anew.
+        """
+        self._grid = grid
+        self._make_sensors()
+        if self.particles is not None and self.estimate is not None and not self.params.upstream:
+            self.particles.free_places = grid.free_places
+            return
+        self.particles = ParticleFilter(self.params, grid.free_places, self._random)
+        self._spread(initial)
+        if self._given is not None:
+            self.set_pose(self._given)
+
+    def set_pose(self, given: PoseEstimate) -> None:
+        """Begin anew at a pose; without a map, when it comes."""
+        self._given = given if self.particles is None else None
+        if self.particles is not None:
+            self._spread(given)
+
+    def set_uniform(self) -> bool:
+        """Begin anew all over the free cells; return false if there are none."""
+        if self.particles is None or not len(self.particles.free_places):
+            return False
+        self.particles.spread_uniformly()
+        self._has_begun = False
+        return True
+
+    def seed(self, seed: int) -> None:
+        """Set the state of the random numbers."""
+        self._random[:] = seeded(seed)
+
+    def reconfigure(self, params: AmclParams) -> None:
+        """Take other parameters; the particles stay.
+
+        Upstream begins anew at its last estimate, or at the origin before the first.
+        """
+        self.params = params
+        if self._grid is None or self.particles is None:
+            return
+        self._make_sensors()
+        self.particles.params = params
+        if params.upstream:
+            self.particles = ParticleFilter(params, self._grid.free_places, self._random)
+            last = self.estimate or PoseEstimate(Pose2D(0.0, 0.0), np.zeros((3, 3)))
+            self._spread(PoseEstimate(last.pose, np.diag(np.diag(last.covariance))))
+
+    def _make_sensors(self) -> None:
+        """Make the likelihood field anew, and forget the lasers."""
+        params, grid = self.params, self._grid
+        assert grid is not None
+        self._lasers = {}
+        self._field = None
+        if params.laser_model_type != BEAM:
+            self._field = likelihood_field(
+                grid,
+                params.laser_likelihood_max_dist_m,
+                params.laser_z_hit,
+                params.laser_sigma_hit_m,
+            )
+
+    def _spread(self, about: PoseEstimate) -> None:
+        assert self.particles is not None
+        self._spreads += 1
+        if self.params.upstream:
+            self.seed(self._spreads)
+        pose = about.pose
+        mean = np.array((pose.x_m, pose.y_m, pose.yaw_rad))
+        self.particles.spread_normally(mean, about.covariance)
+        self._has_begun = False
+
+    def update(self, seen: Observation) -> Optional[Update]:
+        """Take a scan; return None if nothing was done with it."""
+        if self.particles is None or self._grid is None:
+            return None
+        params, odometry = self.params, _planar(seen.odom_from_base)
+        beams = beams_of(
+            seen.scan, seen.base_from_laser, params.laser_min_range_m, params.laser_max_range_m
+        )
+        if beams is None and not params.upstream:
+            return None
+        laser = self._laser(seen)
+        begins, moved = not self._has_begun, False
+        if begins:
+            self._odometry, self._has_begun, self.update_count = odometry, True, 0
+            self._mark_lasers()
+        else:
+            if self._is_update_due(odometry):
+                self._mark_lasers()
+            moved = laser.is_due
+            if moved:
+                self._move(odometry)
+        is_weighed = is_resampled = shows_cloud = False
+        if laser.is_due:
+            if beams is None:  # upstream has moved the particles, and will move them again
+                return None
+            if seen.is_left_out is not None:
+                beams.ranges_m[seen.is_left_out] = np.nan
+            is_weighed, is_resampled = self._weigh(laser, beams, odometry)
+            shows_cloud = not self.is_update_requested
+        estimate = self._estimate(seen) if is_resampled or begins else None
+        return Update(moved, is_weighed, is_resampled, estimate, shows_cloud, self.map_from_odom)
+
+    def _laser(self, seen: Observation) -> Laser:
+        """Return the laser of a scan, made at its first one; the mount stays the first one's."""
+        if seen.laser not in self._lasers:
+            assert self._grid is not None
+            mount = (float(seen.base_from_laser.x_m), float(seen.base_from_laser.y_m))
+            self._lasers[seen.laser] = Laser(self.params, self._grid, self._field, mount)
+        return self._lasers[seen.laser]
+
+    def _mark_lasers(self) -> None:
+        for laser in self._lasers.values():
+            laser.is_due = True
+
+    def _is_update_due(self, odometry: Pose2D) -> bool:
+        """Tell whether the robot has moved enough, or an update was requested."""
+        before, params = self._odometry, self.params
+        is_requested, self.is_update_requested = self.is_update_requested, False
+        return (
+            is_requested
+            or abs(odometry.x_m - before.x_m) > params.update_min_d_m
+            or abs(odometry.y_m - before.y_m) > params.update_min_d_m
+            or abs(angle_difference(odometry.yaw_rad, before.yaw_rad)) > params.update_min_a_rad
+        )
+
+    def _move(self, odometry: Pose2D) -> None:
+        assert self.particles is not None
+        params, before = self.params, self._odometry
+        turn_rad = angle_difference(odometry.yaw_rad, before.yaw_rad)
+        move = move_diff if params.odom_model_type.startswith("diff") else move_omni
+        move(
+            self.particles.poses,
+            odometry.yaw_rad - turn_rad,
+            (odometry.x_m - before.x_m, odometry.y_m - before.y_m, turn_rad),
+            (
+                params.odom_alpha1,
+                params.odom_alpha2,
+                params.odom_alpha3,
+                params.odom_alpha4,
+                params.odom_alpha5,
+            ),
+            params.odom_model_type.endswith("-corrected"),
+            self._random,
+        )
+
+    def _weigh(self, laser: Laser, beams: Beams, odometry: Pose2D) -> Tuple[bool, bool]:
+        """Weigh the particles by a scan, and resample if due; return what was done."""
+        assert self.particles is not None
+        factors = laser.factors(self.particles.poses, self.particles.is_converged, beams)
+        if factors is not None:
+            self.particles.weigh(factors)
+        laser.is_due, self._odometry = False, odometry
+        self.update_count += 1
+        is_resampled = self.update_count % max(self.params.resample_interval, 1) == 0
+        if is_resampled:
+            self.particles.resample()
+        return factors is not None, is_resampled
+
+    def _estimate(self, seen: Observation) -> Optional[PoseEstimate]:
+        """Return the mean of the heaviest cluster, and note the transform that follows."""
+        assert self.particles is not None
+        statistics = self.particles.statistics
+        best = statistics.best
+        if best < 0:
+            return None
+        pose = Pose2D(*statistics.means[best].tolist())
+        covariance = np.zeros((3, 3))
+        covariance[:2, :2] = statistics.covariance[:2, :2]
+        covariance[2, 2] = statistics.covariance[2, 2]
+        self.estimate = PoseEstimate(pose, covariance)
+        self.map_from_odom = pose.to_3d().compose(seen.odom_from_base.inverse())
+        return self.estimate
+
+
+def _planar(pose: Pose3D) -> Pose2D:
+    return Pose2D(pose.x_m, pose.y_m, tilted_yaw(pose.quaternion))
+
+
+def is_covariance(matrix: Floats) -> bool:
+    """Tell whether float64[3, 3] is finite and, rounding apart, positive semidefinite."""
+    if not np.all(np.isfinite(matrix)):
+        return False
+    values = np.linalg.eigvalsh(0.5 * (matrix + matrix.T))
+    return bool(values[0] >= -1e-9 * max(1.0, math.fabs(values[-1])))

@@ -1,0 +1,83 @@
+"""Beams of a scan as the laser models take them: range, and bearing in the base frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Optional
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.geometry import Pose3D, Quaternion, Scan
+
+_NO_RETURN = float(np.finfo(np.float64).max)
+
+
+@dataclass(frozen=True)
+class Beams:
+    """All beams of a scan.
+
+    Attributes:
+        ranges_m: float64[n]; too short ones are ``range_max_m``, too long ones the largest number,
+            and NaN is left out.
+        bearings_rad: float64[n], in the base frame.
+        range_max_m: Largest range.
+    """
+
+    ranges_m: NDArray[np.float64]
+    bearings_rad: NDArray[np.float64]
+    range_max_m: float
+
+
+def beams_of(
+    scan: Scan, base_from_laser: Pose3D, min_range_m: float, max_range_m: float
+) -> Optional[Beams]:
+    """Return the beams of a scan, None if its limits are not sound.
+
+    The bearings follow linearly from the first two beams, which also serves a laser that is upside
+    down.
+
+    Args:
+        scan: The scan.
+        base_from_laser: Mount of the laser.
+        min_range_m: Raises the scan's least range if above 0.
+        max_range_m: Lowers its largest range if above 0.
+    """
+    largest_m, least_m = np.float32(scan.range_max_m), np.float32(scan.range_min_m)
+    if max_range_m > 0.0:
+        largest_m = min(largest_m, np.float32(max_range_m))
+    if min_range_m > 0.0:
+        least_m = max(least_m, np.float32(min_range_m))
+    if not (largest_m > 0.0 and least_m >= 0.0):
+        return None
+    first, second = np.float32(scan.angle_min_rad), np.float32(scan.angle_increment_rad)
+    start_rad = _turned(base_from_laser.quaternion, float(first))
+    step_rad = _turned(base_from_laser.quaternion, float(first + second)) - start_rad
+    step_rad = math.fmod(step_rad + 5 * math.pi, 2 * math.pi) - math.pi
+    ranges_m = scan.ranges_m.astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        too_short, too_long = ranges_m <= least_m, ranges_m > largest_m
+    ranges_m[too_long] = _NO_RETURN
+    ranges_m[too_short] = largest_m
+    bearings_rad = np.add(start_rad, np.arange(len(ranges_m)) * step_rad)
+    return Beams(ranges_m, bearings_rad, float(largest_m))
+
+
+def _turned(quaternion: Quaternion, angle_rad: float) -> float:
+    """Return the yaw of a direction in the laser's plane, seen from the base."""
+    x, y, z, w = quaternion
+    sin, cos = math.sin(0.5 * angle_rad), math.cos(0.5 * angle_rad)
+    return tilted_yaw((x * cos + y * sin, y * cos - x * sin, w * sin + z * cos, w * cos - z * sin))
+
+
+def tilted_yaw(quaternion: Quaternion) -> float:
+    """Return the yaw of a quaternion that need not be a unit, as ``tf2::getYaw``."""
+    x, y, z, w = quaternion
+    xx, yy, zz, ww = x * x, y * y, z * z, w * w
+    sine = -2 * (x * z - w * y) / (xx + yy + zz + ww)
+    if sine <= -0.99999:
+        return -2 * math.atan2(y, x)
+    if sine >= 0.99999:
+        return 2 * math.atan2(y, x)
+    return math.atan2(2 * (x * y + w * z), ww + xx - yy - zz)
