@@ -10,8 +10,9 @@ RUN useradd --create-home quad && install --directory --owner=quad /home/quad/qu
 WORKDIR /home/quad/quad
 # A change of the sources keeps the layers with system packages and virtual environment.
 COPY pyproject.toml ./
-COPY scripts/common.sh scripts/check_python.py scripts/install_packages scripts/packages-debian.txt scripts/
-RUN scripts/install_packages && apt-get clean && rm -rf /var/lib/apt/lists/*
+COPY scripts/check_python.py scripts/chromium scripts/common.sh scripts/install_packages scripts/packages-debian.txt scripts/
+ARG OPTIONS=
+RUN scripts/install_packages $OPTIONS && apt-get clean && rm -rf /var/lib/apt/lists/*
 USER quad
 
 FROM system

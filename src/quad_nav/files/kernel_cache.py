@@ -26,8 +26,8 @@ from quad_nav.files.cache_folder import require_writable, user_cache_folder
 
 COMPILE_S = 60
 """Wall time, about, in which one core compiles the kernels of a flight."""
-COMPILING = f"compiling kernels with numba, once after an installation: {COMPILE_S} s on one core"
-_LONG_S = 3.0  # loading the cache takes less
+COMPILING = f"loading kernels; after an installation numba compiles them, {COMPILE_S} s on one core"
+_LONG_S = 3.0  # loading the cache takes less on a machine that does nothing else
 _THIS = Path(__file__).resolve()  # no part of a kernel
 SOURCES = _THIS.parents[2]
 _PACKAGE = SOURCES / "quad_nav"

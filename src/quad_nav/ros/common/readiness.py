@@ -141,9 +141,9 @@ def wait_for(needs: Sequence[Need], timeout_s: float) -> List[str]:
         if now_s >= warn_s:
             warn_s = now_s + WARN_EVERY_S
             rospy.logwarn(
-                "still waiting after %.0f s:\n  %s",
+                "still waiting after %.0f s:" + "\n  %s" * len(absent),
                 now_s - start_s,
-                "\n  ".join(need.missing() for need in absent),
+                *(need.missing() for need in absent),
             )
         time.sleep(POLL_S)
 

@@ -175,7 +175,8 @@ def main() -> int:
         mission = MissionRunner(setup, RESPAWNED in sys.argv)
     except InputError as error:
         rospy.logfatal(
-            "sequencer: flight not started, invalid input:\n  %s", "\n  ".join(error.problems)
+            "sequencer: flight not started, invalid input:" + "\n  %s" * len(error.problems),
+            *error.problems,
         )
         _write(
             MissionSummary(
