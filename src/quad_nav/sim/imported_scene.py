@@ -52,13 +52,13 @@ class ImportedScene:
 NOTHING = ImportedScene((), None, lambda x_m, y_m: True, ())
 
 
-def from_world(path: Path, model_path: Sequence[Path]) -> ImportedScene:
+def from_world(path: Path) -> ImportedScene:
     """Import a Gazebo world; its extent is that of its obstacles, also of those that move.
 
     Raises:
         InputError: A file has faults; lists all of them.
     """
-    world = load_world(path, model_path)
+    world = load_world(path)
     named = _with_unique_names([*world.obstacles, *(one.shape for one in world.moving)])
     obstacles, shapes = named[: len(world.obstacles)], named[len(world.obstacles) :]
     moving = [replace(one, shape=shape) for one, shape in zip(world.moving, shapes)]

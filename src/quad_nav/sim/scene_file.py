@@ -174,19 +174,13 @@ def _read_import(
     try:
         if "world" in fields:
             path = referenced_file(folder, check.text(fields, "world", "", "."))
-            return from_world(path, model_path())
+            return from_world(path)
         if "map" in fields:
             path = referenced_file(folder, check.text(fields, "map", "", "."))
             return from_map(path, height_m, unknown == "occupied")
     except InputError as error:
         check.problems += error.problems
     return None
-
-
-def model_path() -> List[Path]:
-    """Return the folders of the environment variable GAZEBO_MODEL_PATH."""
-    folders = os.environ.get("GAZEBO_MODEL_PATH", "").split(os.pathsep)
-    return [Path(folder) for folder in folders if folder]
 
 
 def _read_arena(
