@@ -23,6 +23,7 @@ from quad_nav.sim import (
     map_image,
     mesh,
     scene_file,
+    stage_file,
     world_file,
 )
 from quad_nav.topics import flight_info, validation
@@ -51,6 +52,12 @@ ROWS = {
         xml_tree.MAX_DEPTH,
         world_file.MAX_BYTES,
         world_file.MAX_INCLUDES,
+    ],
+    "Stage world": [
+        stage_file.MAX_BYTES,
+        stage_file.MAX_ENTITIES,
+        stage_file.MAX_DEPTH,
+        stage_file.MAX_INCLUDES,
     ],
     "mesh": [
         mesh.MAX_BYTES,

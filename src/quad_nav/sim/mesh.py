@@ -87,14 +87,15 @@ def boxes_of(name: str, triangles: Floats, pose: Pose3D) -> List[Box]:
     low, high = placed.min(axis=(0, 1)), placed.max(axis=(0, 1))
     low[2] = max(low[2], 0.0)
     thicker = np.maximum(_THINNEST_M - (high - low), 0.0)
-    cells, cell_m = _cells(placed, low - thicker / 2, high + thicker / 2)
+    low, high = low - thicker / 2, high + thicker / 2
+    cells, cell_m = _cells(placed, low, high)
     boxes = []
     for number, (first, end) in enumerate(cells):
-        start_m, sizes_m = low - thicker / 2 + first * cell_m, (end - first) * cell_m
-        centre = upright.transform(*(start_m + sizes_m / 2)[:2].tolist())
-        boxes.append(
-            Box(f"{name}_{number}", *centre, *sizes_m.tolist(), upright.yaw_rad, float(start_m[2]))
-        )
+        left_m, front_m, bottom_m = (low + first * cell_m).tolist()
+        x_size_m, y_size_m, height_m = ((end - first) * cell_m).tolist()
+        place = upright.transform(float(left_m + x_size_m / 2), float(front_m + y_size_m / 2))
+        size = (x_size_m, y_size_m, height_m)
+        boxes.append(Box(f"{name}_{number}", *place, *size, upright.yaw_rad, bottom_m))
     return boxes
 
 

@@ -48,7 +48,7 @@ _NOT_FOUND = "that is not found, not in GAZEBO_MODEL_PATH either"
 
 
 @dataclass(frozen=True)
-class GazeboWorld:
+class World:
     """Obstacles of a world, remarks on solids that are left out, and obstacles that move."""
 
     obstacles: Tuple[Obstacle, ...]
@@ -61,7 +61,7 @@ class _TooLarge(InputError):
 
 
 @dataclass
-class _Findings:
+class Findings:
     """Results so far of reading a world and the files that it includes."""
 
     obstacles: List[Obstacle] = field(default_factory=list)
@@ -118,26 +118,27 @@ class _Findings:
             self.leave_out(name, "; ".join(error.problems))
 
     def leave_out(self, name: str, reason: str) -> None:
+        """Keep what is left out, and why."""
         self.left_out.setdefault(reason, []).append(name)
 
     def remarks(self, path: Path) -> Iterator[str]:
         """Return a line on each reason why solids are left out, and on a map that may have them."""
         for reason, names in self.left_out.items():
-            yield f"{path}: {len(names)} left out, {reason}: {_listed(names)}"
+            yield f"{path}: {len(names)} left out, {reason}: {listed(names)}"
         place = find_map(path) if any(one.startswith(_LOST) for one in self.left_out) else None
         if place is not None:
             yield f"{path}: what is left out may be in the map {place}: --scene {place}"
         if self.not_static:
-            yield f"{path}: not static in Gazebo, but fixed here: {_listed(self.not_static)}"
+            yield f"{path}: not static in Gazebo, but fixed here: {listed(self.not_static)}"
 
 
-def load_world(path: Path) -> GazeboWorld:
+def load_world(path: Path) -> World:
     """Read a world, or a file with models only.
 
     Raises:
         InputError: The file cannot be read, or is no world, or one of too many parts.
     """
-    findings = _Findings()
+    findings = Findings()
     root = findings.read(path)
     if root.tag not in ("sdf", "gazebo"):
         raise InputError([f"{path}: line {root.line}: <{root.tag}>, expected <sdf>"])
@@ -156,7 +157,7 @@ def load_world(path: Path) -> GazeboWorld:
         shapes = len(findings.obstacles)
         raise InputError([f"{path}: {shapes} shapes, expected {MAX_OBSTACLES} at most"])
     remarks = tuple(findings.remarks(path))
-    return GazeboWorld(tuple(findings.obstacles), remarks, tuple(findings.moving))
+    return World(tuple(findings.obstacles), remarks, tuple(findings.moving))
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,7 @@ class _Walk:
     """Traversal of the models of one file; each included file gets its own."""
 
     reader: SdfReader
-    findings: _Findings
+    findings: Findings
     folders: Sequence[Path]
     depth: int = 0
 
@@ -274,7 +275,8 @@ class _Walk:
         return boxes_of(name, self.findings.triangles(place) * factors, map_from_mesh)
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
+    """Return names for a remark, many of them as a number."""
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return f"{', '.join(names[:_NAMED])}{more}"
 
@@ -289,4 +291,9 @@ def _state_of(state: Optional[Element], tag: str, name: str) -> Optional[Element
 def _name_of(element: Element, default: str = "") -> str:
     given = element.text_of("name") if element.tag == "include" else element.attributes.get("name")
     name = given or default or element.text_of("uri").split("/")[-1] or element.tag
+    return printable(name)
+
+
+def printable(name: str) -> str:
+    """Return a name as obstacles can have it."""
     return "".join(c if c.isprintable() else "?" for c in name[:_LONGEST_NAME])
