@@ -21,7 +21,9 @@ from quad_nav.sim import (
     imported_scene,
     map_file,
     map_image,
+    mesh,
     scene_file,
+    stage_file,
     world_file,
 )
 from quad_nav.topics import flight_info, validation
@@ -50,6 +52,19 @@ ROWS = {
         xml_tree.MAX_DEPTH,
         world_file.MAX_BYTES,
         world_file.MAX_INCLUDES,
+    ],
+    "Stage world": [
+        stage_file.MAX_BYTES,
+        stage_file.MAX_ENTITIES,
+        stage_file.MAX_DEPTH,
+        stage_file.MAX_INCLUDES,
+    ],
+    "mesh": [
+        mesh.MAX_BYTES,
+        world_file.MAX_MESH_BYTES,
+        mesh.CELL_M,
+        mesh.MAX_CELL_M,
+        mesh.MAX_BOXES,
     ],
     "models, links and collisions": [world_file.MAX_PARTS, world_file.MAX_OBSTACLES],
     "image of a map": [map_image.MAX_BYTES, map_image.MAX_CELLS, values.MAX_MEMORY_BYTES // 10**9],

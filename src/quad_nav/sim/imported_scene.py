@@ -1,4 +1,4 @@
-"""Scenes imported from a Gazebo world or a ``map_server`` map, and start poses for them."""
+"""Scenes imported from a world or a ``map_server`` map, and start poses for them."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from quad_nav.geometry import Pose2D
 from quad_nav.sim.map_file import load_map
 from quad_nav.sim.obstacles import Obstacle
 from quad_nav.sim.scene import BODY_RADIUS_M, MovingObstacle, Scene
+from quad_nav.sim.stage_file import is_stage
+from quad_nav.sim.stage_world import load_stage_world
 from quad_nav.sim.world_file import load_world
 
 Extent = Tuple[float, float, float, float]
@@ -52,13 +54,15 @@ class ImportedScene:
 NOTHING = ImportedScene((), None, lambda x_m, y_m: True, ())
 
 
-def from_world(path: Path, model_path: Sequence[Path]) -> ImportedScene:
-    """Import a Gazebo world; its extent is that of its obstacles, also of those that move.
+def from_world(path: Path, height_m: float) -> ImportedScene:
+    """Import a world of Gazebo or Stage; its extent is that of its obstacles, moving ones too.
+
+    Obstacles of Stage have a height of ``height_m``.
 
     Raises:
         InputError: A file has faults; lists all of them.
     """
-    world = load_world(path, model_path)
+    world = load_stage_world(path, height_m) if is_stage(path) else load_world(path)
     named = _with_unique_names([*world.obstacles, *(one.shape for one in world.moving)])
     obstacles, shapes = named[: len(world.obstacles)], named[len(world.obstacles) :]
     moving = [replace(one, shape=shape) for one, shape in zip(world.moving, shapes)]

@@ -1,4 +1,4 @@
-"""Scenes from files: ``quad``'s own YAML, Gazebo worlds and ``map_server`` maps.
+"""Scenes from files: ``quad``'s own YAML, worlds of Gazebo and Stage, ``map_server`` maps.
 
     name: two rooms                # optional, else the file's name
     size: [12.0, 12.0]             # arena along x and y, m
@@ -72,7 +72,7 @@ MAX_STARTS = 1000
 
 
 def load_scene(path: Union[str, Path]) -> Scene:
-    """Read a scene, a Gazebo world (``.world``, ``.sdf``) or a ``map_server`` map.
+    """Read a scene, a world of Gazebo or Stage (``.world``, ``.sdf``) or a ``map_server`` map.
 
     A YAML file with the key ``image`` is a map.
 
@@ -174,19 +174,13 @@ def _read_import(
     try:
         if "world" in fields:
             path = referenced_file(folder, check.text(fields, "world", "", "."))
-            return from_world(path, model_path())
+            return from_world(path, height_m)
         if "map" in fields:
             path = referenced_file(folder, check.text(fields, "map", "", "."))
             return from_map(path, height_m, unknown == "occupied")
     except InputError as error:
         check.problems += error.problems
     return None
-
-
-def model_path() -> List[Path]:
-    """Return the folders of the environment variable GAZEBO_MODEL_PATH."""
-    folders = os.environ.get("GAZEBO_MODEL_PATH", "").split(os.pathsep)
-    return [Path(folder) for folder in folders if folder]
 
 
 def _read_arena(

@@ -1,25 +1,24 @@
 """Gazebo worlds as obstacles: ``.world`` and ``.sdf`` files, and the models that they include.
 
-Boxes, cylinders and spheres of the models' collisions become obstacles. A plane at z = 0 is the
-floor. Actors with waypoints become moving obstacles, see ``sdf``. A remark names every other
+Boxes, cylinders, spheres and meshes of the models' collisions become obstacles. A plane at z = 0 is
+the floor. Actors with waypoints become moving obstacles, see ``sdf``. A remark names every other
 solid that is left out, with the reason. Poses are composed along world, nested models, link and
 collision. As in Gazebo, a saved ``<state>`` overrides the poses of models and links.
 """
 
 from __future__ import annotations
 
-import os
-import re
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Dict, Iterator, List, Optional, Sequence, Tuple
 
 from quad_nav.errors import InputError
-from quad_nav.files.user_files import referenced_file
 from quad_nav.files.xml_tree import Element, read_xml
 from quad_nav.geometry import Pose3D
-from quad_nav.sim.obstacles import Obstacle
+from quad_nav.sim.mesh import Floats, boxes_of, read_triangles
+from quad_nav.sim.model_files import find_file, find_map, find_model, model_folders
+from quad_nav.sim.obstacles import Box, Obstacle
 from quad_nav.sim.scene import MovingObstacle
 from quad_nav.sim.sdf import (
     IDENTITY,
@@ -35,17 +34,21 @@ MAX_INCLUDES = 16
 """Depth of included files; without a limit, a file that includes itself never ends."""
 MAX_PARTS = 200_000
 """Number of models, links and collisions, included ones too: nested files multiply them."""
+MAX_MESH_BYTES = 512 * 1024 * 1024
+"""Size of all meshes, each counted once."""
 MAX_BYTES = 64 * 1024 * 1024
 """Size of the world and of all files that it includes, each counted once."""
 
 _LONGEST_NAME = 200
 _NAMED = 10  # parts in one remark
-_SCHEME = "model://"
 _OTHER_SOLIDS = ("population", "road")
+_LOST = ("mesh", "<include>", "heightmap")
+"""Reasons of what a map may have."""
+_NOT_FOUND = "that is not found, not in GAZEBO_MODEL_PATH either"
 
 
 @dataclass(frozen=True)
-class GazeboWorld:
+class World:
     """Obstacles of a world, remarks on solids that are left out, and obstacles that move."""
 
     obstacles: Tuple[Obstacle, ...]
@@ -53,8 +56,12 @@ class GazeboWorld:
     moving: Tuple[MovingObstacle, ...] = ()
 
 
+class _TooLarge(InputError):
+    """A limit for a world as a whole is exceeded; other faults leave a part of it out."""
+
+
 @dataclass
-class _Findings:
+class Findings:
     """Results so far of reading a world and the files that it includes."""
 
     obstacles: List[Obstacle] = field(default_factory=list)
@@ -62,7 +69,9 @@ class _Findings:
     left_out: Dict[str, List[str]] = field(default_factory=dict)
     not_static: List[str] = field(default_factory=list)
     files: Dict[Path, Element] = field(default_factory=dict)
+    meshes: Dict[Path, Floats] = field(default_factory=dict)
     bytes_read: int = 0
+    mesh_bytes: int = 0
     parts: int = 0
 
     def read(self, path: Path) -> Element:
@@ -76,12 +85,21 @@ class _Findings:
             self.bytes_read += path.stat().st_size
             if self.bytes_read > MAX_BYTES:
                 problem = f"brings the included files to {self.bytes_read} bytes"
-                raise InputError([f"{path}: {problem}, expected {MAX_BYTES} at most"])
+                raise _TooLarge([f"{path}: {problem}, expected {MAX_BYTES} at most"])
         return self.files[path]
+
+    def triangles(self, path: Path) -> Floats:
+        """Return the triangles of a mesh file; read a file once."""
+        if path not in self.meshes:
+            self.mesh_bytes += path.stat().st_size
+            if self.mesh_bytes > MAX_MESH_BYTES:
+                raise NotRepresented(f"mesh that brings all of them above {MAX_MESH_BYTES} bytes")
+            self.meshes[path] = read_triangles(path)
+        return self.meshes[path]
 
     @contextmanager
     def part(self, name: str, path: Path) -> Iterator[None]:
-        """Read a model, link or collision, which is left out if no obstacle represents it.
+        """Read a model, link or collision; with a fault, or without a shape here, it is left out.
 
         Raises:
             InputError: There are more than ``MAX_PARTS``.
@@ -89,34 +107,45 @@ class _Findings:
         self.parts += 1
         if self.parts > MAX_PARTS:
             what = "models, links and collisions, included ones counted"
-            raise InputError([f"{path}: more than {MAX_PARTS} {what}"])
+            raise _TooLarge([f"{path}: more than {MAX_PARTS} {what}"])
         try:
             yield
         except NotRepresented as reason:
             self.leave_out(name, str(reason))
+        except _TooLarge:
+            raise
+        except InputError as error:  # of an included file
+            self.leave_out(name, "; ".join(error.problems))
 
     def leave_out(self, name: str, reason: str) -> None:
+        """Keep what is left out, and why."""
         self.left_out.setdefault(reason, []).append(name)
 
+    def remarks(self, path: Path) -> Iterator[str]:
+        """Return a line on each reason why solids are left out, and on a map that may have them."""
+        for reason, names in self.left_out.items():
+            yield f"{path}: {len(names)} left out, {reason}: {listed(names)}"
+        place = find_map(path) if any(one.startswith(_LOST) for one in self.left_out) else None
+        if place is not None:
+            yield f"{path}: what is left out may be in the map {place}: --scene {place}"
+        if self.not_static:
+            yield f"{path}: not static in Gazebo, but fixed here: {listed(self.not_static)}"
 
-def load_world(path: Path, model_path: Sequence[Path] = ()) -> GazeboWorld:
+
+def load_world(path: Path) -> World:
     """Read a world, or a file with models only.
-
-    ``<include>`` looks for ``model://`` beside the file, in the folders ``models`` there and one
-    level up, and in the folders of ``model_path``.
 
     Raises:
         InputError: The file cannot be read, or is no world, or one of too many parts.
     """
-    findings = _Findings()
+    findings = Findings()
     root = findings.read(path)
     if root.tag not in ("sdf", "gazebo"):
         raise InputError([f"{path}: line {root.line}: <{root.tag}>, expected <sdf>"])
     worlds = list(root.all("world"))
     if len(worlds) > 1:
         raise InputError([f"{path}: line {worlds[1].line}: a second <world>, expected one"])
-    folders = (path.parent, path.parent / "models", path.parent.parent / "models", *model_path)
-    walk = _Walk(SdfReader(path), findings, folders)
+    walk = _Walk(SdfReader(path), findings, model_folders(path))
     world = worlds[0] if worlds else root
     walk.models(world, IDENTITY, "", world.first("state"))
     for actor in world.all("actor"):
@@ -127,13 +156,8 @@ def load_world(path: Path, model_path: Sequence[Path] = ()) -> GazeboWorld:
     if len(findings.obstacles) > MAX_OBSTACLES:
         shapes = len(findings.obstacles)
         raise InputError([f"{path}: {shapes} shapes, expected {MAX_OBSTACLES} at most"])
-    found = {
-        f"{len(names)} left out, {reason}": names for reason, names in findings.left_out.items()
-    }
-    if findings.not_static:
-        found["not static in Gazebo, but fixed here"] = findings.not_static
-    remarks = tuple(f"{path}: {what}: {_listed(names)}" for what, names in found.items())
-    return GazeboWorld(tuple(findings.obstacles), remarks, tuple(findings.moving))
+    remarks = tuple(findings.remarks(path))
+    return World(tuple(findings.obstacles), remarks, tuple(findings.moving))
 
 
 @dataclass(frozen=True)
@@ -141,7 +165,7 @@ class _Walk:
     """Traversal of the models of one file; each included file gets its own."""
 
     reader: SdfReader
-    findings: _Findings
+    findings: Findings
     folders: Sequence[Path]
     depth: int = 0
 
@@ -205,7 +229,8 @@ class _Walk:
         if path is None:
             if uri == "model://ground_plane":
                 return
-            raise NotRepresented(f"<include> of {uri or 'nothing'}, not found")
+            self.findings.leave_out(f"{_name_of(include)} ({uri})", f"<include> {_NOT_FOUND}")
+            return
         root = self.findings.read(path)
         walk = _Walk(SdfReader(path), self.findings, self.folders, self.depth + 1)
         for model in root.all("model"):
@@ -231,12 +256,27 @@ class _Walk:
         with self.findings.part(name, self.reader.path):
             map_from_shape = map_from_link.compose(self.reader.pose(collision))
             geometry = collision.first("geometry") or Element("geometry", {}, collision.line)
+            mesh = geometry.first("mesh")
+            if mesh is not None:
+                self.findings.obstacles += self._mesh(mesh, name, map_from_shape)
+                return
             obstacle = obstacle_of(self.reader, geometry, name, map_from_shape)
             if obstacle is not None:
                 self.findings.obstacles.append(obstacle)
 
+    def _mesh(self, mesh: Element, name: str, map_from_mesh: Pose3D) -> List[Box]:
+        if mesh.first("submesh") is not None:
+            raise NotRepresented("mesh of which a part is named")
+        place = find_file(mesh.text_of("uri"), (self.reader.path.parent, *self.folders))
+        if place is None:
+            raise NotRepresented(f"mesh {_NOT_FOUND}")
+        scale = mesh.first("scale")
+        factors = self.reader.numbers(scale, 3, "three numbers") if scale else [1.0] * 3
+        return boxes_of(name, self.findings.triangles(place) * factors, map_from_mesh)
 
-def _listed(names: Sequence[str]) -> str:
+
+def listed(names: Sequence[str]) -> str:
+    """Return names for a remark, many of them as a number."""
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return f"{', '.join(names[:_NAMED])}{more}"
 
@@ -251,44 +291,9 @@ def _state_of(state: Optional[Element], tag: str, name: str) -> Optional[Element
 def _name_of(element: Element, default: str = "") -> str:
     given = element.text_of("name") if element.tag == "include" else element.attributes.get("name")
     name = given or default or element.text_of("uri").split("/")[-1] or element.tag
+    return printable(name)
+
+
+def printable(name: str) -> str:
+    """Return a name as obstacles can have it."""
     return "".join(c if c.isprintable() else "?" for c in name[:_LONGEST_NAME])
-
-
-def find_model(uri: str, folders: Sequence[Path]) -> Optional[Path]:
-    """Return the SDF file of a model in the first folder that has it, None if none has.
-
-    ``model://name`` is a folder. Its ``model.config`` names the file, or several, of which the one
-    with the highest version counts. Without ``model.config``, or with one that is no XML, it is
-    ``model.sdf``. URIs that lead out of the folders are not found.
-
-    Raises:
-        InputError: A link or a ``model.config`` leads out of the folders.
-    """
-    name = PurePosixPath(uri[len(_SCHEME) :] if uri.startswith(_SCHEME) else uri)
-    if "://" in str(uri[len(_SCHEME) :]) or name.is_absolute() or ".." in name.parts:
-        return None
-    if not name.parts:
-        return None
-    for folder in folders:
-        place = folder / name
-        if not os.path.exists(place):  # Path.exists raises where a name is too long
-            continue
-        referenced_file(folder, str(name), folders)
-        path = _sdf_in(place, folders) if place.is_dir() else place
-        if os.path.exists(path):
-            return path
-    return None
-
-
-def _sdf_in(folder: Path, folders: Sequence[Path]) -> Path:
-    config = folder / "model.config"
-    try:
-        files = list(read_xml(config).all("sdf")) if config.exists() else []
-    except InputError:  # many have an & in their descriptions; Gazebo's own reader goes on, too
-        files = []
-    named = [(_version(sdf.attributes.get("version", "")), sdf.text.strip()) for sdf in files]
-    return referenced_file(folder, max(named)[1] if named else "model.sdf", folders)
-
-
-def _version(text: str) -> Tuple[int, ...]:
-    return tuple(int(part) for part in text.split(".") if re.fullmatch("[0-9]{1,9}", part))

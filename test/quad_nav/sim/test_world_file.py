@@ -33,6 +33,7 @@ def model(
     )
 
 
+LOST = "that is not found, not in GAZEBO_MODEL_PATH either"
 CASES = Path(__file__).parents[2] / "field_cases"
 
 
@@ -205,7 +206,7 @@ def test_ground_plane_and_sun_are_floor_and_light(tmp_path):
     [
         (model(BOX, "0 0 2 0.1 0 0"), "1 left out, tilted box: m/l/c"),
         (model(CYLINDER, "0 0 2 0 1.5 0"), "1 left out, tilted cylinder: m/l/c"),
-        (model("<mesh><uri>a.dae</uri></mesh>"), "1 left out, mesh: m/l/c"),
+        (model("<mesh><uri>a.dae</uri></mesh>"), f"1 left out, mesh {LOST}: m/l/c"),
         (model("<a/>") + model("<a/>", name="n"), "2 left out, a: m/l/c, n/l/c"),
         (model("<plane/>", "0 0 1 0 0 0"), "1 left out, plane that is not the floor: m/l/c"),
         (model(BOX, "0 0 -1.5 0 0 0"), "1 left out, nothing above the floor: m/l/c"),
@@ -214,12 +215,12 @@ def test_ground_plane_and_sun_are_floor_and_light(tmp_path):
             "1 left out, pose relative to a named frame: m/l/c",
         ),
         (
-            "<include><name>t</name><uri>model://table</uri></include>",
-            "1 left out, <include> of model://table, not found: t",
+            "<include><name>t</name><uri>model://no_table</uri></include>",
+            f"1 left out, <include> {LOST}: t (model://no_table)",
         ),
         (
             "<include><uri>model://../a</uri></include>",
-            "1 left out, <include> of model://../a, not found: a",
+            f"1 left out, <include> {LOST}: a (model://../a)",
         ),
         (
             '<model name="m"><static>1</static><link name="l"><visual name="v"/></link></model>',
@@ -329,7 +330,9 @@ def test_one_bad_detail_does_not_refuse_a_world(case, obstacles, remark):
 
 
 def test_a_world_of_meshes_says_what_was_left_out():
-    with pytest.raises(InputError, match="4 left out, mesh: .*expected a scene with world, size"):
+    with pytest.raises(
+        InputError, match=f"4 left out, mesh {LOST}: .*expected a scene with world, size"
+    ):
         load_scene(CASES / "meshes_only" / "room.world")
 
 
