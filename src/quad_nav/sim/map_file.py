@@ -71,7 +71,7 @@ class OccupancyMap:
     Attributes:
         fields: Content of the YAML file.
         occupancy: int8[H, W], row 0 at the lower edge; 0 free, 100 occupied, -1 unknown.
-        remarks: Notes for the user on keys that are ignored.
+        remarks: Notes for the user on what map_server reads otherwise.
     """
 
     fields: MapFields
@@ -132,12 +132,13 @@ def load_map(document: Any, path: Path) -> OccupancyMap:
     if check.problems or fields is None:
         raise InputError(check.problems)
     pixels = read_pixels(fields.image, fields.mode == "trinary")
-    remarks = tuple(
+    remarks = [f"{fields.image}: {pixels.remark}"] if pixels.remark else []
+    remarks += [
         f"{path}: {key}: ignored, map_server has no such key"
         for key in document
         if key not in _KEYS
-    )
-    return OccupancyMap(fields, occupancy_of(pixels, fields), remarks)
+    ]
+    return OccupancyMap(fields, occupancy_of(pixels, fields), tuple(remarks))
 
 
 def occupancy_of(pixels: Pixels, fields: MapFields) -> Cells:
