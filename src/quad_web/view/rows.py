@@ -212,7 +212,7 @@ def samples_item(
     if scene is not None and known.any():
         distances_m = scene.flight_surface_distances_m(positions[known])
         x_m, y_m = positions[known].T
-        for solid in moving:
+        for solid in scene.touchable(moving):
             own_m = solid.surface_distance_m(x_m, y_m, scene.altitude_m)
             np.minimum(distances_m, own_m, out=distances_m)
         clearances_m[known] = distances_m - radius_m
