@@ -9,16 +9,16 @@ with their inner faces on its border.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Dict, Iterable, List, Optional, Sequence, Tuple, Type
+from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple, Type, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.motion import Motion, Walkers
-from quad_nav.sim.obstacles import Box, Cylinder, Obstacle, Sphere
+from quad_nav.sim.obstacles import Box, Cylinder, Obstacle
 
 Floats = NDArray[np.float64]
 
@@ -196,8 +196,9 @@ def hull_heights_m(altitude_m: float) -> Tuple[float, float]:
 
 
 def _stretched(solid: Obstacle, altitude_m: float) -> Obstacle:
-    if solid.crosses(altitude_m) or isinstance(solid, Sphere):
-        return solid
+    given = {one.name for one in fields(cast(Any, solid)) if one.init}
+    if solid.crosses(altitude_m) or not given >= {"bottom_m", "height_m"}:
+        return solid  # a sphere is nowhere as wide as at its middle
     bottom_m = min(solid.bottom_m, altitude_m)
     return solid.changed(bottom_m=bottom_m, height_m=max(solid.top_m, altitude_m) - bottom_m)
 

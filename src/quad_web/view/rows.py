@@ -215,6 +215,7 @@ def samples_item(
         for solid in scene.touchable(moving):
             own_m = solid.surface_distance_m(x_m, y_m, scene.altitude_m)
             np.minimum(distances_m, own_m, out=distances_m)
+        distances_m[np.isinf(distances_m)] = np.nan  # nothing can be touched
         clearances_m[known] = distances_m - radius_m
     speeds_mps = np.hypot(poses[:, 6], poses[:, 7])
     cycles_s = unknown if cycles_s is None else cycles_s

@@ -8,6 +8,7 @@ from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.scenario.goal_plans import unreachable_goals
 from quad_nav.sim.obstacles import Box
 from quad_nav.sim.scene import Scene, Walls
+from quad_nav.sim.scene_file import load_scene
 from quad_nav.sim.unseen import unseen_obstacles
 
 CASES = Path(__file__).parents[2] / "field_cases"
@@ -24,6 +25,19 @@ def test_goals_without_a_plan_are_named():
         "quad0: goal 2 (7.65, 5.65)",
         "quad0: goal 3 (4, 0.31)",
     ]
+
+
+def test_starts_are_chosen_where_the_goals_can_be_reached():
+    """The map has a closed room, from (8.5, 3) to (15.5, 9), around its middle."""
+    case = CASES / "start_pocket"
+    setup = read_setup(FlightOptions(case / "map.yaml", case, "default"))
+    assert inside_room(setup.scene) == [1]  # only the goal of quad1 is inside
+    assert unreachable_goals(setup) == []
+    assert inside_room(load_scene(case / "map.yaml")) == []
+
+
+def inside_room(scene):
+    return [k for k, one in enumerate(scene.starts) if 9 < one.x_m < 15 and 3.5 < one.y_m < 8.5]
 
 
 def test_a_table_that_the_lidar_misses_is_named():
