@@ -25,8 +25,9 @@ def touched_cells(scene: Scene, spec: GridSpec, margin_m: float = 0.0) -> NDArra
     most ``margin_m`` from one.
     """
     touched = np.zeros(spec.shape, np.bool_)
-    x_m: NDArray[np.float64] = spec.origin_x_m + (np.arange(spec.size_x) + 0.5) * spec.resolution_m
-    y_m: NDArray[np.float64] = spec.origin_y_m + (np.arange(spec.size_y) + 0.5) * spec.resolution_m
+    columns_rows = (np.arange(size, dtype=np.float64) for size in (spec.size_x, spec.size_y))
+    x_m, y_m = ((cells + 0.5) * spec.resolution_m for cells in columns_rows)
+    x_m, y_m = spec.origin_x_m + x_m, spec.origin_y_m + y_m
     boxes = [solid for solid in scene.in_flight if isinstance(solid, Box)]
     _mark_boxes(touched, x_m, y_m, _rows_of(boxes), margin_m)
     for solid in scene.in_flight:
