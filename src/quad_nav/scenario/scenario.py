@@ -35,6 +35,7 @@ from quad_nav.scenario.goal_checks import (
     coverage_notes,
     file_warnings,
     goals_off_the_costmap,
+    map_warnings,
     place_check,
     with_planner_tolerance,
 )
@@ -134,6 +135,7 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
         *last_goal_conflicts(robots, request.robot_radius),
         *file_warnings(robots, configurations),
         *small,
+        *(map_warnings(scene, configurations, bool(request.source)) if scene else ()),
         *_body_cautions(configurations, float(request.robot_radius)),
     )
     notes = tuple(coverage_notes(configurations))

@@ -9,7 +9,7 @@ with their inner faces on its border.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple, Type, cast
 
@@ -66,6 +66,7 @@ class Scene:
         motion_phase_s: Time by which all motions are ahead of the clock; None for a random part of
             the longest loop.
         walkers: People who walk, if there are any.
+        is_map: A map of ``map_server`` gave the obstacles.
     """
 
     name: str
@@ -81,6 +82,7 @@ class Scene:
     moving: Tuple[MovingObstacle, ...] = ()
     motion_phase_s: Optional[float] = 0.0
     walkers: Optional[Walkers] = None
+    is_map: bool = field(default=False, compare=False)
 
     @property
     def end_x_m(self) -> float:

@@ -150,6 +150,7 @@ def _read_scene(
         (*content.moving, *moving),
         read_phase(check, fields, "motion_phase", ""),
         read_walkers(check, fields),
+        is_map="map" in fields,
     )
     check_motions(check, scene)
     _check_names(check, scene)
