@@ -17,8 +17,7 @@ from quad_nav.sim.autopilot import Autopilot, flight_params
 from quad_nav.sim.body import World
 from quad_nav.sim.contacts import ContactLog
 from quad_nav.sim.flight import Airframe, AutopilotResponse, BodyState, FlightLaw, FlightParams
-from quad_nav.sim.lidar import MOUNT_HEIGHT_M
-from quad_nav.sim.scene import GUARD_HEIGHT_M, Scene, Walls
+from quad_nav.sim.scene import GUARD_HEIGHT_M, MOUNT_HEIGHT_M, Scene, Walls
 from quad_nav.sim.simulation_params import STEP_S
 
 REST_M = GUARD_HEIGHT_M / 2.0 - MOUNT_HEIGHT_M

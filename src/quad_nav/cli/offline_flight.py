@@ -17,7 +17,7 @@ from quad_nav.cli import EXIT_INTERRUPTED, add_ons
 from quad_nav.cli.options import echo, echo_lines, exit_on_faults, parameter, show_warnings
 from quad_nav.cli.outputs import Outputs
 from quad_nav.cli.pictures import FlightPictures
-from quad_nav.cli.progress import ProgressBar, compile_kernels
+from quad_nav.cli.progress import ProgressBar, clock, compile_kernels
 from quad_nav.errors import InputError, PluginError
 from quad_nav.files import plain_yaml
 from quad_nav.files.shipped import shipped
@@ -76,7 +76,8 @@ def fly_mission(
             quiet=quiet,
         )
         options = _options(**given)
-        setup = read_setup(options)
+        with clock("reading the mission", quiet):
+            setup = read_setup(options)
         page = _page(served) if web else None
     _compile(setup, quiet)
     while True:
@@ -84,7 +85,7 @@ def fly_mission(
             drawn = FlightPictures(setup, outputs)
             observers = _observers(record)
             if not quiet:
-                show_warnings((*setup.warnings, *unreachable_goals(setup)))
+                _show_warnings(setup)
             facts = offline_facts(options, setup, ["quad", *sys.argv[1:]])
             status = _fly(setup, facts, observers, outputs, drawn, quiet, processes, page)
         if page is None or status == EXIT_INTERRUPTED or not _is_wanted_again(page):
@@ -94,6 +95,12 @@ def fly_mission(
     if page is not None:
         page.close()
     sys.exit(status)
+
+
+def _show_warnings(setup: FlightSetup) -> None:
+    with clock("looking for plans", quiet=False):
+        unreachable = unreachable_goals(setup)
+    show_warnings((*setup.warnings, *unreachable))
 
 
 def _compile(setup: FlightSetup, quiet: bool) -> None:

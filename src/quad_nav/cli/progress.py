@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
-from typing import Callable, Iterable, Optional
+from typing import Callable, Iterable, Iterator, Optional
 
 from rich.console import Console
 from rich.progress import (
@@ -32,28 +33,28 @@ def compile_kernels(configurations: Iterable[Configuration], quiet: bool) -> Non
     Raises:
         PluginError: A plugin has a mistake.
     """
-    console = Console(stderr=True)
-    clock = Progress(
-        TextColumn("compiling"),
-        TimeElapsedColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    )
-    clock.add_task("")
+    with contextlib.ExitStack() as shown:
 
-    def announce() -> None:
-        if not quiet:
-            echo(COMPILING, err=True)
-            clock.start()
+        def announce() -> None:
+            if not quiet:
+                echo(COMPILING, err=True)
+                shown.enter_context(clock("compiling", quiet))
 
-    try:
         with announced(announce):
             simulate()
             for configuration in distinct(configurations):
                 warm_up(configuration)
-    finally:
-        clock.stop()
+
+
+@contextlib.contextmanager
+def clock(text: str, quiet: bool) -> Iterator[None]:
+    """Show what is done inside, and for how long already; afterwards nothing of it is left."""
+    console = Console(stderr=True)
+    columns = (TextColumn(text), TimeElapsedColumn())
+    hidden = quiet or not console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=hidden) as shown:
+        shown.add_task("")
+        yield
 
 
 def flights_progress(quiet: bool) -> Progress:

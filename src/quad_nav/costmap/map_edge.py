@@ -7,7 +7,9 @@ there. A plan along the edge leads the robot into them.
 from __future__ import annotations
 
 from contextlib import contextmanager
-from typing import Iterator
+from typing import Any, Iterator, List
+
+from numpy.typing import NDArray
 
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.geometry import Pose2D
@@ -25,8 +27,7 @@ def closed_edge(
     (``NavigatorParams.plan_inside_map``), in a costmap that rolls with the robot, and if start or
     goal, in the costmap's frame, are that near to the edge or off the costmap.
     """
-    spec, costs = costmap.spec, costmap.costs
-    cells = int(costmap.inscribed_radius_m / spec.resolution_m + 0.5)
+    spec, cells = costmap.spec, _edge_cells(costmap)
     if (
         not closes
         or cells == 0
@@ -35,7 +36,7 @@ def closed_edge(
     ):
         yield
         return
-    strips = costs[:cells], costs[-cells:], costs[:, :cells], costs[:, -cells:]
+    strips = edge_strips(costmap.costs, costmap)
     open_costs = [strip.copy() for strip in strips]
     for strip in strips:
         strip[...] = LETHAL
@@ -44,6 +45,16 @@ def closed_edge(
     finally:
         for strip, before in zip(strips, open_costs):
             strip[...] = before
+
+
+def edge_strips(cells: NDArray[Any], costmap: LayeredCostmap) -> List[NDArray[Any]]:
+    """Return the four strips at the edge of an array [H, W] of a costmap's cells."""
+    count = _edge_cells(costmap)
+    return [cells[:count], cells[-count:], cells[:, :count], cells[:, -count:]] if count else []
+
+
+def _edge_cells(costmap: LayeredCostmap) -> int:
+    return int(costmap.inscribed_radius_m / costmap.spec.resolution_m + 0.5)
 
 
 def _is_inside(spec: GridSpec, pose: Pose2D, cells: int) -> bool:

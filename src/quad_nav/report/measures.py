@@ -80,16 +80,17 @@ def speed_mps(robot: RobotTrace) -> NDArray[np.float64]:
 
 
 def clearances_m(tracks: Tracks, trace: FlightTrace) -> NDArray[np.float64]:
-    """Return each robot's clearance, shape (n, t); NaN without a scene."""
+    """Return each robot's clearance, shape (n, t); NaN if nothing can be touched."""
     if trace.scene is None or tracks.positions_m.size == 0:
         return np.full(tracks.yaws_rad.shape, np.nan)
     movers = trace.movers or Movers(trace.scene)
-    return distances.clearances_m(
+    clearances = distances.clearances_m(
         tracks.positions_m,
         tracks.times_s,
         movers.flight_surface_distances_m,
         trace.robot_radius_m,
     )
+    return np.where(np.isinf(clearances), np.nan, clearances)
 
 
 def trace_span_s(trace: FlightTrace) -> Span:

@@ -14,6 +14,7 @@ from quad_nav.mission.goal_file import PlaceCheck, SequenceSettings, clearance_c
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.scenario.coverage import (
     BYTES_PER_CELL,
+    COSTMAP,
     SIZE_FROM_SCENE,
     Bounds,
     area_text,
@@ -26,6 +27,7 @@ from quad_nav.scenario.coverage import (
 )
 from quad_nav.sim.scene import Scene
 
+_MAP = f"{COSTMAP}/static_map=true"
 _YAW_FIELD = "yaw_goal_tolerance_rad"  # of both local planners
 OFF_COSTMAP = "is off the global costmap"
 """Beginning of the fault of a goal to which no plan can lead."""
@@ -148,6 +150,25 @@ def cover_warnings(
             + _expected_size(area, costmap, in_a_file)
         )
     return lines
+
+
+def map_warnings(
+    scene: Scene, configurations: Sequence[Optional[Configuration]], in_a_file: bool
+) -> List[str]:
+    """A warning on global costmaps without the map that the scene is, see ``cover_warnings``."""
+    without = [
+        number
+        for number, one in enumerate(configurations)
+        if one and not any(isinstance(p, StaticLayerParams) for _, p in one.global_costmap.layers)
+    ]
+    if not without or not scene.is_map:
+        return []
+    place = " in the file of override0:= or in robot0.yaml" if in_a_file else ""
+    line = "global_costmap: {static_map: true}, and map_server" if in_a_file else f"--set {_MAP}"
+    return [
+        f"{robots_text(without)}: global_costmap does not use the scene's map: plans lead through "
+        f"walls that were not seen yet; expected{place} {line} (or a StaticLayer among its plugins)"
+    ]
 
 
 def _bounds_if_small(configuration: Optional[Configuration], area: Bounds) -> Optional[Bounds]:

@@ -12,16 +12,20 @@ from quad_nav.config import Configuration
 from quad_nav.config.plugins import Plugin
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
-from quad_nav.costmap.map_edge import closed_edge
+from quad_nav.costmap.map_edge import closed_edge, edge_strips
 from quad_nav.costmap.static import StaticLayerParams, StaticMap
 from quad_nav.errors import PlanningError
 from quad_nav.geometry import Pose2D
+from quad_nav.grid import INSCRIBED
 from quad_nav.mission.goal_file import GoalSequence
+from quad_nav.plan.global_planner import SearchPlannerParams
+from quad_nav.plan.navfn import NavfnParams
 from quad_nav.scenario.assembly import build_global_planner
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.scenario.goal_checks import bounds_of
 from quad_nav.scenario.scene_map import scene_map, scene_map_problem, scene_occupancy
 from quad_nav.sim.scene import Scene
+from quad_nav.sim.scene_cells import parts_of
 
 _ROUNDING_M = 1e-9
 NO_PLAN: NDArray[np.float64] = np.empty((0, 2))
@@ -34,6 +38,8 @@ def unreachable_goals(setup: FlightSetup) -> List[str]:
         return []  # a user's class is called in the flight alone, where its mistakes are told
     found = []
     for number, (robot, start) in enumerate(zip(setup.robots, setup.scene.starts)):
+        if plans.surely_connect(number, [start, *(one.pose for one in robot.sequence.goals)]):
+            continue
         faults = [""] * len(robot.sequence.goals)
         found += plans.plans(number, start, robot.sequence, faults)[1]
     return found
@@ -48,6 +54,28 @@ class GoalPlans:
         """Plan in a scene with the configurations of robots, by their numbers."""
         self.scene, self._configurations = scene, configurations
         self._costmaps: Dict[CostmapParams, LayeredCostmap] = {}
+        self._parts: Dict[Tuple[CostmapParams, int], NDArray[np.int32]] = {}
+
+    def surely_connect(self, number: int, poses: Sequence[Pose2D]) -> bool:
+        """Return whether all poses are in one part of the free cells of a robot's costmap.
+
+        Planners that search the whole costmap then find plans between them; there is no need to try
+        each one. It is False for other planners.
+        """
+        costmap, configuration = self.costmap(number), self._configurations.get(number)
+        planner = configuration.global_planner if configuration else None
+        if costmap is None or not isinstance(planner, (NavfnParams, SearchPlannerParams)):
+            return False
+        lethal = min(getattr(planner, "lethal_cost", INSCRIBED), INSCRIBED)
+        if (costmap.params, lethal) not in self._parts:
+            free = costmap.costs < lethal - 1
+            for strip in edge_strips(free, costmap):
+                strip[...] = False
+            self._parts[costmap.params, lethal] = parts_of(free)
+        parts = self._parts[costmap.params, lethal]
+        cells = [costmap.spec.cell_of(pose.x_m, pose.y_m) for pose in poses]
+        found = {int(parts[cell[::-1]]) if cell else 0 for cell in cells}
+        return len(found) == 1 and 0 not in found
 
     def plans(
         self,

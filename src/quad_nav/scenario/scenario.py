@@ -7,6 +7,7 @@ from its seed, so that no node waits for another one's files.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from quad_nav.config.notes import without_effect
 from quad_nav.config.robot_tree import RobotSource, robot_tree
 from quad_nav.errors import InputError
 from quad_nav.files.values import optional, value_faults
-from quad_nav.mission.goal_file import DEFAULT_SETTINGS, SequenceSettings
+from quad_nav.mission.goal_file import DEFAULT_SETTINGS, SequenceSettings, load_goals
 from quad_nav.mission.robot_goals import (
     RobotGoals,
     goal_paths,
@@ -34,6 +35,7 @@ from quad_nav.scenario.goal_checks import (
     coverage_notes,
     file_warnings,
     goals_off_the_costmap,
+    map_warnings,
     place_check,
     with_planner_tolerance,
 )
@@ -133,6 +135,7 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
         *last_goal_conflicts(robots, request.robot_radius),
         *file_warnings(robots, configurations),
         *small,
+        *(map_warnings(scene, configurations, bool(request.source)) if scene else ()),
         *_body_cautions(configurations, float(request.robot_radius)),
     )
     notes = tuple(coverage_notes(configurations))
@@ -173,11 +176,23 @@ def mission_of(values: Mapping[str, Any]) -> Optional[RandomMission]:
 def scene_of(values: Mapping[str, Any]) -> Scene:
     """Return the scene of a file, or of the random mission, that ``scene`` asks for.
 
+    Starts that the file does not give are chosen where the robots can reach their ``goals``.
+
     Raises:
         InputError: The file cannot be read or has faults, or a random arena is too small.
     """
     mission = mission_of(values)
-    return load_scene(values["scene"]) if mission is None else mission.scene
+    return mission.scene if mission else load_scene(values["scene"], _first_goals(values))
+
+
+def _first_goals(values: Mapping[str, Any]) -> List[Optional[Tuple[float, float]]]:
+    """Return the place of each robot's first goal, None if no file that can be read has it."""
+    goals = {}
+    for number, path in _goal_files(values.get("goals"), values.get("robots"))[0].items():
+        with contextlib.suppress(InputError):  # its faults are told when the mission is read
+            for first in load_goals(path).goals[:1]:
+                goals[number] = (first.x_m, first.y_m)
+    return [goals.get(number) for number in range(max(goals, default=-1) + 1)]
 
 
 def area_of(values: Mapping[str, Any]) -> Optional[Bounds]:
@@ -290,7 +305,7 @@ def _read_goals(
     located: Sequence[Optional[Configuration]],
     configurations: Sequence[Optional[Configuration]],
 ) -> Tuple[List[RobotGoals], List[str]]:
-    paths, missing = _goal_files(request)
+    paths, missing = _goal_files(request.goals, request.robots, request.source)
     known, placed = dict(enumerate(configurations)), dict(enumerate(located))
     checks = {
         number: place_check(scene, request.robot_radius, placed.get(number)) for number in paths
@@ -302,16 +317,15 @@ def _read_goals(
     return robots, missing + faults
 
 
-def _goal_files(request: ScenarioRequest) -> Tuple[Dict[int, Path], List[str]]:
+def _goal_files(goals: Any, count: Any, source: str = "") -> Tuple[Dict[int, Path], List[str]]:
     """Return the existing goal files, by the robots' numbers, and a fault for those missing."""
-    goals, count = request.goals, request.robots
-    if goals is None or not count:
+    if not goals or not count:
         return {}, []
     if isinstance(goals, str):
         return goal_paths(Path(goals).expanduser(), count)
     problems = []
     if len(goals) != count:
-        place = f"{request.source}: goals" if request.source else "goals"
+        place = f"{source}: goals" if source else "goals"
         problems = [f"{place}: lists {len(goals)} files; expected one for each of {count} robots"]
     return {number: Path(path).expanduser() for number, path in enumerate(goals)}, problems
 

@@ -13,8 +13,7 @@ from quad_nav.costmap.static import StaticLayer, StaticLayerParams, StaticMap
 from quad_nav.files.values import memory_problem
 from quad_nav.grid import GridSpec
 from quad_nav.sim.scene import Scene
-
-_ROWS = 64  # of cells per block: bounds the memory of one block's distances
+from quad_nav.sim.scene_cells import touched_cells
 
 
 class SceneMaps:
@@ -51,7 +50,7 @@ def scene_map_problem(scene: Scene, params: CostmapParams) -> str:
 def scene_map(scene: Scene, resolution_m: float) -> StaticMap:
     """Map a scene up to the outer faces of its walls.
 
-    A cell is occupied if its centre is in a wall or an obstacle, else free.
+    A cell is occupied if its centre is in a wall or an obstacle that a hull in flight can touch.
     """
     margin_m = scene.walls.thickness_m
     low_x, low_y = scene.origin_x_m - margin_m, scene.origin_y_m - margin_m
@@ -68,14 +67,6 @@ def scene_map(scene: Scene, resolution_m: float) -> StaticMap:
 def scene_occupancy(scene: Scene, spec: GridSpec, margin_m: float = 0.0) -> NDArray[np.int8]:
     """Return the occupancy of a grid in ``map``, int8[H, W].
 
-    It is 100 where a cell's centre is in a wall or an obstacle, or at most ``margin_m`` from one,
-    else 0.
+    It is 100 for the cells of ``touched_cells``, else 0.
     """
-    x_m = spec.origin_x_m + (np.arange(spec.size_x) + 0.5) * spec.resolution_m
-    y_m = spec.origin_y_m + (np.arange(spec.size_y) + 0.5) * spec.resolution_m
-    occupancy = np.zeros(spec.shape, dtype=np.int8)
-    for row in range(0, spec.size_y, _ROWS):
-        rows = slice(row, row + _ROWS)
-        centres = np.stack(np.meshgrid(x_m, y_m[rows]), axis=-1)
-        occupancy[rows][scene.flight_surface_distances_m(centres) <= margin_m] = 100
-    return occupancy
+    return np.where(touched_cells(scene, spec, margin_m), np.int8(100), np.int8(0))

@@ -30,6 +30,7 @@ DEFAULT_BEAMS = 512
 DEFAULTS: Dict[str, Any] = {
     "scene": "",  # file, or random
     "size": 0.0,  # a random arena's side, m; 0: room for all
+    "goals": "",  # as the sequencer's: starts that a scene lacks are where goals can be reached
     "config": "",  # folder of a fleet's navigators
     "robots": 2,
     "rate": 1.0,  # simulated seconds per second
@@ -56,6 +57,7 @@ DEFAULTS: Dict[str, Any] = {
 _RULES = {
     **{name: RULES[name] for name in DEFAULTS},
     "config": optional(RULES["config"]),
+    "goals": optional(RULES["goals"]),
     "hosts": optional(RULES["hosts"], 0),
 }
 

@@ -20,9 +20,8 @@ from quad_nav.geometry import Pose2D, quaternion_from_yaw
 from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.contacts import Touch
 from quad_nav.sim.flight import GRAVITY_MPS2, Airframe, BodyState
-from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.obstacles import Box, Obstacle
-from quad_nav.sim.scene import GUARD_HEIGHT_M, Scene
+from quad_nav.sim.scene import GUARD_HEIGHT_M, MOUNT_HEIGHT_M, Scene
 from quad_nav.sim.solids import grouped
 
 with discarded_stderr():  # pybullet prints its build time

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from quad_nav.geometry import Scan
 from quad_nav.sim.flight import BodyState
-from quad_nav.sim.lidar import MOUNT_HEIGHT_M, LidarParams, beam_directions, lidar_poses, make_scan
+from quad_nav.sim.lidar import LidarParams, beam_directions, lidar_poses, make_scan
 from quad_nav.sim.lidar_kernel import Beams, Solids, cast_scans
 from quad_nav.sim.rays import CYLINDER
-from quad_nav.sim.scene import BODY_RADIUS_M, GUARD_HEIGHT_M, Scene
+from quad_nav.sim.scene import BODY_RADIUS_M, GUARD_HEIGHT_M, MOUNT_HEIGHT_M, Scene
 from quad_nav.sim.solids import join, place, solids_of, split_scene
 
 Floats = NDArray[np.float64]

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.sim.flight import BodyState, FlightLaw
-from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.rigid_body import MOVING, NO_INDEX, FreeSpace, MovingSolids, fly_freely
-from quad_nav.sim.scene import GUARD_HEIGHT_M, Scene
+from quad_nav.sim.scene import GUARD_HEIGHT_M, MOUNT_HEIGHT_M, Scene
 
 Floats = NDArray[np.float64]
 

@@ -9,26 +9,35 @@ from pathlib import Path
 from typing import Any, Callable, List, Optional, Sequence, Set, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.files.document import read_yaml
 from quad_nav.geometry import Pose2D
+from quad_nav.grid import GridSpec
 from quad_nav.sim.map_file import load_map
 from quad_nav.sim.obstacles import Obstacle
-from quad_nav.sim.scene import BODY_RADIUS_M, MovingObstacle, Scene
+from quad_nav.sim.scene import BODY_RADIUS_M, Floats, MovingObstacle, Scene
+from quad_nav.sim.scene_cells import parts_of, touched_cells
 from quad_nav.sim.stage_file import is_stage
 from quad_nav.sim.stage_world import load_stage_world
 from quad_nav.sim.world_file import load_world
 
 Extent = Tuple[float, float, float, float]
 """Smallest x and y, largest x and y in m, in ``map``."""
+Place = Optional[Tuple[float, float]]
+MayStart = Callable[[Floats, Floats], NDArray[np.bool_]]
 
 MAX_CHOSEN_STARTS = 8
-MAX_CANDIDATES = 1000
-"""Candidates whose surface distance is computed; with 200000 boxes that takes about 10 s."""
 START_DISTANCE_M = 2 * BODY_RADIUS_M
 """Least distance of a chosen start from obstacles and walls."""
 START_SPACING_M = 2.0
 """Least distance of two chosen starts."""
+NARROW_DISTANCE_M = BODY_RADIUS_M + 0.1
+"""That of a start where no place is wider."""
+_HULL_M = BODY_RADIUS_M + 0.05
+"""Half of the narrowest passage between two parts: the robot_radius of ``config/default``."""
+_CELL_M, _MAX_CELLS = 0.1, 5e5
+"""Side of a cell in which passages are searched, larger in arenas of more cells than this."""
 _MAX_LATTICE_POINTS = 20_000
 
 
@@ -39,19 +48,24 @@ class ImportedScene:
     Attributes:
         obstacles: The obstacles, with unique names.
         extent: Bounding box of the obstacles, or of the map; None if there is nothing.
-        may_start: Returns whether a robot may start at a position (x, y) in ``map``.
+        may_start: Returns whether a robot may start at positions in ``map``, bool[n] of x and y,
+            float64[n] each.
         remarks: Notes for the user on content that was left out.
         moving: The obstacles that move, with unique names, too.
     """
 
     obstacles: Tuple[Obstacle, ...]
     extent: Optional[Extent]
-    may_start: Callable[[float, float], bool]
+    may_start: MayStart
     remarks: Tuple[str, ...]
     moving: Tuple[MovingObstacle, ...] = ()
 
 
-NOTHING = ImportedScene((), None, lambda x_m, y_m: True, ())
+def _anywhere(x_m: Floats, y_m: Floats) -> NDArray[np.bool_]:
+    return np.ones(len(x_m), np.bool_)
+
+
+NOTHING = ImportedScene((), None, _anywhere, ())
 
 
 def from_world(path: Path, height_m: float) -> ImportedScene:
@@ -69,7 +83,7 @@ def from_world(path: Path, height_m: float) -> ImportedScene:
     everywhere = (one.shape.placed(pose) for one in moving for pose in one.motion.poses)
     outlines = [solid.outline_m() for solid in (*obstacles, *everywhere)]
     return ImportedScene(
-        tuple(obstacles), _extent(outlines), lambda x_m, y_m: True, world.remarks, tuple(moving)
+        tuple(obstacles), _extent(outlines), _anywhere, world.remarks, tuple(moving)
     )
 
 
@@ -109,27 +123,73 @@ def _extent(points: Sequence[Any]) -> Optional[Extent]:
     return (x_m, y_m, *together.max(axis=0).tolist())
 
 
-def with_free_starts(scene: Scene, may_start: Callable[[float, float], bool]) -> Scene:
+def with_free_starts(scene: Scene, may_start: MayStart, goals: Sequence[Place] = ()) -> Scene:
     """Return the scene with up to ``MAX_CHOSEN_STARTS`` start poses, none if no point is free.
 
-    Candidates are the points of a lattice from the arena's centre outwards. A start may be used
-    by ``may_start``, is at least ``START_DISTANCE_M`` from everything and ``START_SPACING_M``
-    from the other starts, and faces along x. The choice is deterministic.
+    A start may be used by ``may_start``, is ``START_DISTANCE_M`` from everything and
+    ``START_SPACING_M`` from the other starts, and faces along x. Where there is no such place, one
+    between narrow walls will do. The choice is deterministic.
+
+    Args:
+        scene: The scene.
+        may_start: See ``ImportedScene``.
+        goals: First goal of robot 0, 1, ..., from whose part of the arena it has to start; for
+            None, and for further robots, the part with most places to start from.
     """
-    starts: List[Pose2D] = []
-    candidates = 0
-    for x_m, y_m in _lattice(scene):
-        place = Pose2D(x_m, y_m)
-        if not may_start(x_m, y_m) or any(
-            place.distance_to(start) < START_SPACING_M for start in starts
-        ):
-            continue
-        candidates += 1
-        if scene.surface_distance_m(x_m, y_m, scene.altitude_m) >= START_DISTANCE_M:
-            starts.append(place)
-        if len(starts) == MAX_CHOSEN_STARTS or candidates == MAX_CANDIDATES:
-            break
-    return replace(scene, starts=tuple(starts))
+    starts: Tuple[Pose2D, ...] = ()
+    for distance_m in (START_DISTANCE_M, NARROW_DISTANCE_M):
+        starts = starts or tuple(_Ground(scene, may_start, distance_m).starts(goals))
+    return replace(scene, starts=starts)
+
+
+class _Ground:
+    """Places of an arena where a robot can start, and the parts that it can reach from there."""
+
+    def __init__(self, scene: Scene, may_start: MayStart, distance_m: float) -> None:
+        self._scene, self._distance_m = scene, distance_m
+        cell_m = max(_CELL_M, math.sqrt(scene.size_x_m * scene.size_y_m / _MAX_CELLS))
+        columns, rows = (math.ceil(one / cell_m) for one in (scene.size_x_m, scene.size_y_m))
+        self._spec = GridSpec(columns, rows, cell_m, scene.origin_x_m, scene.origin_y_m)
+        self._parts = parts_of(~touched_cells(scene, self._spec, _HULL_M))
+        roomy = ~touched_cells(scene, self._spec, max(distance_m - cell_m, 0.0))
+        roomy &= self._parts > 0
+        at_rows, at_columns = np.nonzero(roomy)
+        x_m = scene.origin_x_m + (at_columns + 0.5) * cell_m
+        y_m = scene.origin_y_m + (at_rows + 0.5) * cell_m
+        off_m = np.hypot(x_m - scene.centre[0], y_m - scene.centre[1])
+        fine = np.column_stack([x_m, y_m])[np.argsort(off_m, kind="stable")]
+        places = np.concatenate([np.reshape(_lattice(scene), (-1, 2)), fine])
+        cells = ((places - (scene.origin_x_m, scene.origin_y_m)) / cell_m).astype(int)
+        at = cells[:, 1].clip(0, rows - 1), cells[:, 0].clip(0, columns - 1)
+        fits = roomy[at] & may_start(places[:, 0], places[:, 1])
+        self._places, self._place_parts = places[fits], self._parts[at][fits]
+
+    def _part(self, x_m: float, y_m: float) -> int:
+        """Return the part of the arena at a point, 0 for none."""
+        cell = self._spec.cell_of(x_m, y_m)
+        return 0 if cell is None else int(self._parts[cell[1], cell[0]])
+
+    def starts(self, goals: Sequence[Place]) -> List[Pose2D]:
+        """Choose starts, those near the arena's centre first, see ``with_free_starts``."""
+        starts: List[Pose2D] = []
+        if not len(self._places):
+            return starts
+        largest = int(np.bincount(self._place_parts).argmax())
+        left = np.ones(len(self._places), bool)
+        for number in range(MAX_CHOSEN_STARTS):
+            goal = goals[number] if number < len(goals) else None
+            part = (self._part(*goal) if goal else 0) or largest
+            for index in np.flatnonzero(left & (self._place_parts == part)):
+                x_m, y_m = self._places[index].tolist()
+                left[index] = False
+                if (
+                    self._scene.surface_distance_m(x_m, y_m, self._scene.altitude_m)
+                    >= self._distance_m
+                ):
+                    starts.append(Pose2D(x_m, y_m))
+                    left &= np.hypot(*(self._places - (x_m, y_m)).T) >= START_SPACING_M
+                    break
+        return starts
 
 
 def _lattice(scene: Scene) -> List[Tuple[float, float]]:

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.sim.flight import BodyState
+from quad_nav.sim.scene import MOUNT_HEIGHT_M
 
 Floats = NDArray[np.float64]
 
-MOUNT_HEIGHT_M = 0.06
 base_from_lidar = Pose3D(0.0, 0.0, MOUNT_HEIGHT_M)
 
 

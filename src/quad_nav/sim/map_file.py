@@ -15,7 +15,6 @@ default parameters has a lethal cost, see ``occupancy_of``.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, List, Optional, Tuple
@@ -71,7 +70,7 @@ class OccupancyMap:
     Attributes:
         fields: Content of the YAML file.
         occupancy: int8[H, W], row 0 at the lower edge; 0 free, 100 occupied, -1 unknown.
-        remarks: Notes for the user on keys that are ignored.
+        remarks: Notes for the user on what map_server reads otherwise.
     """
 
     fields: MapFields
@@ -83,14 +82,16 @@ class OccupancyMap:
         occupied: NDArray[np.bool_] = self.occupancy >= OCCUPIED
         return occupied | (self.occupancy == UNKNOWN) if unknown_too else occupied
 
-    def is_free(self, x_m: float, y_m: float) -> bool:
-        """Return whether the cell at a point in ``map`` is known to be free."""
-        origin, height_width = self.fields.origin, self.occupancy.shape
-        right_m, up_m = origin.inverse_transform(x_m, y_m)
-        column = math.floor(right_m / self.fields.resolution_m)
-        row = math.floor(up_m / self.fields.resolution_m)
-        inside = 0 <= row < height_width[0] and 0 <= column < height_width[1]
-        return inside and 0 <= self.occupancy[row, column] < OCCUPIED
+    def is_free(self, x_m: NDArray[np.float64], y_m: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return whether the cells at points in ``map``, float64[n], are known to be free."""
+        right_m, up_m = self.fields.origin.inverse_transform(x_m, y_m)
+        columns = np.floor(right_m / self.fields.resolution_m).astype(int)
+        rows = np.floor(up_m / self.fields.resolution_m).astype(int)
+        height, width = self.occupancy.shape
+        inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+        found = self.occupancy[rows.clip(0, height - 1), columns.clip(0, width - 1)]
+        free: NDArray[np.bool_] = inside & (found >= FREE) & (found < OCCUPIED)
+        return free
 
     def corners(self) -> List[Tuple[float, float]]:
         """Return the image's four corners in ``map``."""
@@ -132,12 +133,13 @@ def load_map(document: Any, path: Path) -> OccupancyMap:
     if check.problems or fields is None:
         raise InputError(check.problems)
     pixels = read_pixels(fields.image, fields.mode == "trinary")
-    remarks = tuple(
+    remarks = [f"{fields.image}: {pixels.remark}"] if pixels.remark else []
+    remarks += [
         f"{path}: {key}: ignored, map_server has no such key"
         for key in document
         if key not in _KEYS
-    )
-    return OccupancyMap(fields, occupancy_of(pixels, fields), remarks)
+    ]
+    return OccupancyMap(fields, occupancy_of(pixels, fields), tuple(remarks))
 
 
 def occupancy_of(pixels: Pixels, fields: MapFields) -> Cells:

@@ -16,11 +16,16 @@ from quad_nav.files.values import memory_problem
 
 MAX_CELLS = 10_000 * 10_000
 MAX_BYTES = 512 * 1024 * 1024
-_BYTES_PER_PIXEL = {"1": 7, "L": 6, "LA": 9, "RGB": 10, "RGBA": 12, "I;16": 9, "I;16B": 9, "I": 13}
+_BYTES_PER_PIXEL = {"1": 7, "L": 6, "LA": 12, "RGB": 10, "RGBA": 12, "I;16": 9, "I;16B": 9, "I": 13}
 _MOST_BYTES_PER_PIXEL = 13
 """Memory of an image's pixels, sums and occupancy while a map is read, measured."""
 _FORMATS = ("PPM", "PNG")  # PPM includes PGM
-_PALETTE_MODES = {"1": "L", "P": "RGBA", "PA": "RGBA", "CMYK": "RGB", "La": "LA", "RGBa": "RGBA"}
+_AS_SDL_LOADS = {"1": "L", "LA": "RGBA"}
+"""Modes of images that map_server's SDL_image loads with other channels."""
+PALETTE_REMARK = (
+    "has a palette: its colours are used as they look, but map_server uses their numbers in the "
+    "palette; expected a grey image for map_server"
+)
 
 
 @dataclass(frozen=True)
@@ -30,12 +35,15 @@ class Pixels:
     Attributes:
         sums: uint16[H, W], sums over the channels, each of them 0 to 255.
         channels: Number of channels.
-        opaque: bool[H, W], false where a pixel is transparent.
+        opaque: bool[H, W], false where a pixel is transparent to map_server: where the last of
+            several channels is 0, blue too.
+        remark: Note for the user on how map_server reads the image; "" for nearly all.
     """
 
     sums: NDArray[np.uint16]
     channels: int
     opaque: NDArray[np.bool_]
+    remark: str = ""
 
 
 def read_pixels(path: Path, alpha_counts: bool) -> Pixels:
@@ -77,13 +85,19 @@ def _check_size(path: Path, image: Image.Image) -> None:
 
 
 def _pixels(image: Image.Image, alpha_counts: bool) -> Pixels:
-    if image.mode in _PALETTE_MODES:
-        image = image.convert(_PALETTE_MODES[image.mode])
+    remark = ""
+    if image.mode == "P":
+        # SDL_image shows map_server the colours only if several are transparent.
+        has_colours = isinstance(image.info.get("transparency"), bytes)
+        numbers, image = image, image.convert("RGBA" if has_colours else "RGB")
+        if not has_colours and (np.asarray(numbers)[:, :, None] != np.asarray(image)).any():
+            remark = PALETTE_REMARK
+    image = image.convert(_AS_SDL_LOADS.get(image.mode, image.mode))
     array = np.asarray(image)
     if array.dtype != np.uint8:  # 16 bits per channel, of which the upper 8 are used
         array = (array.astype(np.uint32) >> 8).astype(np.uint8)
     channels = array if array.ndim == 3 else array[:, :, None]
-    has_alpha = channels.shape[2] in (2, 4)
-    opaque = channels[:, :, -1] > 0 if has_alpha else np.ones(channels.shape[:2], bool)
-    counted = channels if alpha_counts or not has_alpha else channels[:, :, :-1]
-    return Pixels(counted.sum(axis=2, dtype=np.uint16), counted.shape[2], opaque)
+    count = channels.shape[2]
+    opaque = channels[:, :, -1] > 0 if count > 1 else np.ones(channels.shape[:2], bool)
+    counted = channels if alpha_counts or count < 4 else channels[:, :, :-1]
+    return Pixels(counted.sum(axis=2, dtype=np.uint16), counted.shape[2], opaque, remark)

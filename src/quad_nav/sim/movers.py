@@ -152,6 +152,9 @@ class Movers:
         nearest = np.full(positions_m.shape[:-1], np.inf)
         poses = self.poses_at(times_s)
         for k, shape in enumerate(self.shapes):
+            touchable = self._scene.touchable([shape.placed((0.0, 0.0, 0.0))])
+            if not touchable:
+                continue
             x_m, y_m, yaw_rad = poses[:, k].T
             local = rotate_vectors(
                 np.cos(yaw_rad),
@@ -159,8 +162,7 @@ class Movers:
                 positions_m[..., 0] - x_m,
                 positions_m[..., 1] - y_m,
             )
-            at_origin = shape.placed((0.0, 0.0, 0.0))
-            own = at_origin.surface_distance_m(*local, self._scene.altitude_m)
+            own = touchable[0].surface_distance_m(*local, self._scene.altitude_m)
             np.fmin(nearest, own, out=nearest)  # nobody knows where NaN is
         return nearest
 

@@ -9,9 +9,9 @@ with their inner faces on its border.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Dict, Iterable, List, Optional, Sequence, Tuple, Type
+from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple, Type, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ BODY_RADIUS_M = 0.30
 """Default radius of the quadcopter's guard, the cylinder that collides and that beams hit."""
 GUARD_HEIGHT_M = 0.24
 """Height of the guard; the LIDAR is at its centre."""
+MOUNT_HEIGHT_M = 0.06
+"""Height of the LIDAR above the quadcopter's origin, which flies at the altitude."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,7 @@ class Scene:
         motion_phase_s: Time by which all motions are ahead of the clock; None for a random part of
             the longest loop.
         walkers: People who walk, if there are any.
+        is_map: A map of ``map_server`` gave the obstacles.
     """
 
     name: str
@@ -79,6 +82,7 @@ class Scene:
     moving: Tuple[MovingObstacle, ...] = ()
     motion_phase_s: Optional[float] = 0.0
     walkers: Optional[Walkers] = None
+    is_map: bool = field(default=False, compare=False)
 
     @property
     def end_x_m(self) -> float:
@@ -107,26 +111,33 @@ class Scene:
         return self.nearest(x_m, y_m, z_m).surface_distance_m(x_m, y_m, z_m)
 
     def flight_surface_distance_m(self, x_m: float, y_m: float) -> float:
-        """Return the distance to the nearest obstacle or wall at the flying altitude."""
-        return self.surface_distance_m(x_m, y_m, self.altitude_m)
+        """Return the distance along the floor to the nearest of ``in_flight``; +inf without any."""
+        return float(self.flight_surface_distances_m(np.array([x_m, y_m])))
 
     def flight_surface_distances_m(self, positions_m: Floats) -> Floats:
         """Return ``flight_surface_distance_m`` of many points: float64[..., 2] to float64[...]."""
-        x_m, y_m = positions_m[..., 0], positions_m[..., 1]
-        nearest = np.full(x_m.shape, np.inf)
-        for solid in self._nearest_to_any(positions_m.reshape(-1, 2)):
-            np.minimum(nearest, solid.surface_distance_m(x_m, y_m, self.altitude_m), out=nearest)
-        return nearest
+        return _distances_m(self._in_flight_by_shape, positions_m, self.altitude_m)
 
-    def _nearest_to_any(self, positions_m: Floats) -> List[Obstacle]:
-        """Return all obstacles that can be the nearest to one of the points float64[n, 2].
+    def surface_distances_m(self, positions_m: Floats, z_m: float) -> Floats:
+        """Return ``surface_distance_m`` of many points: float64[..., 2] to float64[...]."""
+        return _distances_m(self._by_shape, positions_m, z_m)
 
-        The surface distances of two points differ by at most the distance of the points.
+    @cached_property
+    def in_flight(self) -> Tuple[Obstacle, ...]:
+        """Walls and obstacles that a hull at the flying altitude can touch, see ``touchable``."""
+        return tuple(self.touchable((*self.wall_boxes(), *self.obstacles)))
+
+    def touchable(self, solids: Iterable[Obstacle]) -> List[Obstacle]:
+        """Return the solids that a hull at the flying altitude can touch.
+
+        They are stretched to that altitude: a hull has a height, and distances are those of points.
         """
-        x_m, y_m = positions_m[0]
-        reach_m = float(np.hypot(*(positions_m - positions_m[0]).T).max())
-        here = (x_m, y_m, self.altitude_m, 2 * reach_m)
-        return [solid for alike in self._by_shape for solid in alike.within(*here)]
+        bottom_m, top_m = hull_heights_m(self.altitude_m)
+        return [
+            _stretched(one, self.altitude_m)
+            for one in solids
+            if one.bottom_m < top_m and one.top_m > bottom_m
+        ]
 
     def nearest(self, x_m: float, y_m: float, z_m: float) -> Obstacle:
         """Return the obstacle or wall whose surface is nearest to a point."""
@@ -173,10 +184,48 @@ class Scene:
 
     @cached_property
     def _by_shape(self) -> List[_Alike]:
-        alike: Dict[Type[Obstacle], List[Obstacle]] = {}
-        for solid in (*self.wall_boxes(), *self.obstacles):
-            alike.setdefault(type(solid), []).append(solid)
-        return [_Alike(solids) for solids in alike.values()]
+        return _by_shape((*self.wall_boxes(), *self.obstacles))
+
+    @cached_property
+    def _in_flight_by_shape(self) -> List[_Alike]:
+        return _by_shape(self.in_flight)
+
+
+def hull_heights_m(altitude_m: float) -> Tuple[float, float]:
+    """Return the lowest and the highest point of a quadcopter's guard at an altitude."""
+    centre_m = altitude_m + MOUNT_HEIGHT_M
+    return centre_m - 0.5 * GUARD_HEIGHT_M, centre_m + 0.5 * GUARD_HEIGHT_M
+
+
+def _stretched(solid: Obstacle, altitude_m: float) -> Obstacle:
+    given = {one.name for one in fields(cast(Any, solid)) if one.init}
+    if solid.crosses(altitude_m) or not given >= {"bottom_m", "height_m"}:
+        return solid  # a sphere is nowhere as wide as at its middle
+    bottom_m = min(solid.bottom_m, altitude_m)
+    return solid.changed(bottom_m=bottom_m, height_m=max(solid.top_m, altitude_m) - bottom_m)
+
+
+def _by_shape(solids: Iterable[Obstacle]) -> List[_Alike]:
+    alike: Dict[Type[Obstacle], List[Obstacle]] = {}
+    for solid in solids:
+        alike.setdefault(type(solid), []).append(solid)
+    return [_Alike(one) for one in alike.values()]
+
+
+def _distances_m(by_shape: Sequence[_Alike], positions_m: Floats, z_m: float) -> Floats:
+    """Return the distances of points float64[..., 2] to the nearest surface; +inf without any.
+
+    The surface distances of two points differ by at most the distance of the points: obstacles
+    that are farther from the first point are the nearest to none.
+    """
+    x_m, y_m = positions_m[..., 0], positions_m[..., 1]
+    nearest = np.full(x_m.shape, np.inf)
+    points_m = positions_m.reshape(-1, 2)
+    reach_m = float(np.hypot(*(points_m - points_m[0]).T).max())
+    for alike in by_shape:
+        for solid in alike.within(points_m[0, 0], points_m[0, 1], z_m, 2 * reach_m):
+            np.minimum(nearest, solid.surface_distance_m(x_m, y_m, z_m), out=nearest)
+    return nearest
 
 
 class _Alike:

@@ -39,6 +39,7 @@ from quad_nav.geometry import Pose2D
 from quad_nav.sim.imported_scene import (
     NOTHING,
     ImportedScene,
+    Place,
     from_map,
     from_world,
     with_free_starts,
@@ -71,10 +72,11 @@ MAX_SIZE_M = 1e5
 MAX_STARTS = 1000
 
 
-def load_scene(path: Union[str, Path]) -> Scene:
+def load_scene(path: Union[str, Path], goals: Sequence[Place] = ()) -> Scene:
     """Read a scene, a world of Gazebo or Stage (``.world``, ``.sdf``) or a ``map_server`` map.
 
-    A YAML file with the key ``image`` is a map.
+    A YAML file with the key ``image`` is a map. Starts that the file does not give are chosen where
+    robots can reach ``goals``, see ``imported_scene.with_free_starts``.
 
     Raises:
         InputError: The file cannot be read, or has faults; lists all of them.
@@ -87,11 +89,15 @@ def load_scene(path: Union[str, Path]) -> Scene:
         document = read_yaml(path)
         if isinstance(document, dict) and "image" in document:
             document = {"map": place.name}
-    return scene_from_document(document, str(path), path.stem, place.parent)
+    return scene_from_document(document, str(path), path.stem, place.parent, goals)
 
 
 def scene_from_document(
-    document: Any, source: str, default_name: str = "scene", folder: Path = Path()
+    document: Any,
+    source: str,
+    default_name: str = "scene",
+    folder: Path = Path(),
+    goals: Sequence[Place] = (),
 ) -> Scene:
     """Check a parsed document and make a scene of it.
 
@@ -100,18 +106,21 @@ def scene_from_document(
         source: Name of the document, for messages.
         default_name: Name of the scene if the document gives none.
         folder: Folder of the files that the document refers to.
+        goals: See ``load_scene``.
 
     Raises:
         InputError: The document has faults; lists all of them.
     """
     check = Checker(source)
-    scene = _read_scene(check, document, default_name, folder)
+    scene = _read_scene(check, document, default_name, folder, goals)
     if scene is None or check.problems:
         raise InputError(check.problems)
     return scene
 
 
-def _read_scene(check: Checker, document: Any, default_name: str, folder: Path) -> Optional[Scene]:
+def _read_scene(
+    check: Checker, document: Any, default_name: str, folder: Path, goals: Sequence[Place]
+) -> Optional[Scene]:
     fields = check.mapping(document, "", _KEYS)
     if fields is None:
         return None
@@ -141,11 +150,12 @@ def _read_scene(check: Checker, document: Any, default_name: str, folder: Path) 
         (*content.moving, *moving),
         read_phase(check, fields, "motion_phase", ""),
         read_walkers(check, fields),
+        is_map="map" in fields,
     )
     check_motions(check, scene)
     _check_names(check, scene)
     if arena_is_sound and imported and "starts" not in fields:
-        return _with_chosen_starts(check, scene, imported)
+        return _with_chosen_starts(check, scene, imported, goals)
     if arena_is_sound:
         _check_starts(check, scene, starts)
     return scene
@@ -255,8 +265,10 @@ def _read_starts(
     return [_read_start(check, entry, f"starts[{k}]") for k, entry in enumerate(starts)]
 
 
-def _with_chosen_starts(check: Checker, scene: Scene, imported: ImportedScene) -> Scene:
-    scene = with_free_starts(scene, imported.may_start)
+def _with_chosen_starts(
+    check: Checker, scene: Scene, imported: ImportedScene, goals: Sequence[Place]
+) -> Scene:
+    scene = with_free_starts(scene, imported.may_start, goals)
     if not scene.starts:
         check.fault(
             "starts",

@@ -11,8 +11,7 @@ from typing import List
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.sim.lidar import MOUNT_HEIGHT_M
-from quad_nav.sim.scene import GUARD_HEIGHT_M, Scene
+from quad_nav.sim.scene import MOUNT_HEIGHT_M, Scene, hull_heights_m
 
 _STEP_M, _FAR_M, _LOWEST_M = 0.05, 2.0, 0.3
 """Altitudes that are tried: how fine, how far from the scene's own, and the lowest one."""
@@ -57,6 +56,7 @@ def _is_unseen(
     margin_m: float = 0.0,
 ) -> NDArray[np.bool_]:
     """Tell of solids between these heights, float64[n] each, whether they are touched unseen."""
-    reach_m, plane_m = 0.5 * GUARD_HEIGHT_M, altitude_m + MOUNT_HEIGHT_M
-    is_touched = (bottoms_m < plane_m + reach_m) & (tops_m > plane_m - reach_m)
+    plane_m = altitude_m + MOUNT_HEIGHT_M
+    lowest_m, highest_m = hull_heights_m(altitude_m)
+    is_touched = (bottoms_m < highest_m) & (tops_m > lowest_m)
     return is_touched & ((plane_m < bottoms_m + margin_m) | (plane_m > tops_m - margin_m))

@@ -22,7 +22,6 @@ the start, and then played forwards and backwards in turn, so that no person jum
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any, List, Tuple
 
@@ -138,7 +137,6 @@ def round_down(time_s: float) -> int:
 def ground_of(scene: Scene) -> Ground:
     """Return the distances to the obstacles and walls of a scene at half a person's height."""
     assert scene.walkers is not None
-    level = replace(scene, altitude_m=scene.walkers.height_m / 2)
     cell_m = max(_CELL_M, math.sqrt(scene.size_x_m * scene.size_y_m / _MAX_CELLS))
     low = np.array([scene.origin_x_m, scene.origin_y_m]) + cell_m / 2
     columns, rows = (
@@ -148,7 +146,7 @@ def ground_of(scene: Scene) -> Ground:
     distances = np.empty((rows, columns))
     for row in range(0, rows, 64):
         centres = np.stack(np.meshgrid(x_m, y_m[row : row + 64]), axis=-1)
-        distances[row : row + 64] = level.flight_surface_distances_m(centres)
+        distances[row : row + 64] = scene.surface_distances_m(centres, 0.5 * scene.walkers.height_m)
     return Ground(distances, float(low[0]), float(low[1]), cell_m)
 
 

@@ -14,10 +14,9 @@ from quad_nav.geometry import Pose2D
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.sequencer import Sequencer
 from quad_nav.sim.colours import robot_rgba
-from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.movers import Movers
 from quad_nav.sim.obstacles import Box, Obstacle
-from quad_nav.sim.scene import BODY_RADIUS_M, Scene
+from quad_nav.sim.scene import BODY_RADIUS_M, MOUNT_HEIGHT_M, Scene
 
 # Shapes, numbered as in visualization_msgs/Marker.
 ARROW = 0

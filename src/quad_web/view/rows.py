@@ -212,9 +212,10 @@ def samples_item(
     if scene is not None and known.any():
         distances_m = scene.flight_surface_distances_m(positions[known])
         x_m, y_m = positions[known].T
-        for solid in moving:
+        for solid in scene.touchable(moving):
             own_m = solid.surface_distance_m(x_m, y_m, scene.altitude_m)
             np.minimum(distances_m, own_m, out=distances_m)
+        distances_m[np.isinf(distances_m)] = np.nan  # nothing can be touched
         clearances_m[known] = distances_m - radius_m
     speeds_mps = np.hypot(poses[:, 6], poses[:, 7])
     cycles_s = unknown if cycles_s is None else cycles_s

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
+from quad_nav.files.shipped import shipped
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.scenario.goal_plans import unreachable_goals
+from quad_nav.scenario.mission_setup import read_setup as read_mission
 from quad_nav.sim.obstacles import Box
 from quad_nav.sim.scene import Scene, Walls
+from quad_nav.sim.scene_file import load_scene
 from quad_nav.sim.unseen import unseen_obstacles
 
 CASES = Path(__file__).parents[2] / "field_cases"
@@ -24,6 +29,39 @@ def test_goals_without_a_plan_are_named():
         "quad0: goal 2 (7.65, 5.65)",
         "quad0: goal 3 (4, 0.31)",
     ]
+
+
+def test_starts_are_chosen_where_the_goals_can_be_reached():
+    """The map has a closed room, from (8.5, 3) to (15.5, 9), around its middle."""
+    case = CASES / "start_pocket"
+    setup = read_setup(FlightOptions(case / "map.yaml", case, "default"))
+    assert inside_room(setup.scene) == [1]  # only the goal of quad1 is inside
+    assert unreachable_goals(setup) == []
+    assert inside_room(load_scene(case / "map.yaml")) == []
+
+
+@pytest.mark.parametrize(
+    "parameters, is_told", [((), True), ((("global_costmap/static_map", True),), False)]
+)
+def test_a_map_that_the_costmap_does_not_use_is_told(parameters, is_told):
+    case = CASES / "start_pocket"
+    setup = read_setup(FlightOptions(case / "map.yaml", case, "default", parameters))
+    lines = [one for one in setup.warnings if "does not use the scene's map" in one]
+    assert [line.partition(": ")[0] for line in lines] == ["quad0, quad1"] * is_told
+    assert all("expected --set global_costmap/static_map=true" in line for line in lines)
+
+
+def test_the_sequencer_tells_of_the_map_with_the_file_to_change(tmp_path):
+    case = CASES / "start_pocket"
+    given = {"scene": str(case / "map.yaml"), "goals": str(case), "robots": 2}
+    given["config"] = str(shipped("config", "default"))
+    told = read_mission(given, "/sequencer", tmp_path / "result.json", tmp_path).warnings
+    (line,) = [one for one in told if "does not use the scene's map" in one]
+    assert "in robot0.yaml global_costmap: {static_map: true}, and map_server" in line
+
+
+def inside_room(scene):
+    return [k for k, one in enumerate(scene.starts) if 9 < one.x_m < 15 and 3.5 < one.y_m < 8.5]
 
 
 def test_a_table_that_the_lidar_misses_is_named():

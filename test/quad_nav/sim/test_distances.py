@@ -5,9 +5,10 @@ import pytest
 
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.distances import BLOCK_S, DistanceLog, nearest_separations_m
+from quad_nav.sim.motion import Motion
 from quad_nav.sim.movers import Movers
-from quad_nav.sim.obstacles import Cylinder
-from quad_nav.sim.scene import Scene, Walls
+from quad_nav.sim.obstacles import Box, Cylinder
+from quad_nav.sim.scene import MovingObstacle, Scene, Walls
 
 RADIUS_M = 0.3
 
@@ -96,6 +97,29 @@ def test_distances_in_a_scene():
     assert log.min_clearance_m("quad1") == pytest.approx(2.7)
     assert log.min_separation_m("quad0") == log.min_separation_m("quad1")
     assert log.min_separation_m("quad0") == pytest.approx(5.0 - 0.6)
+
+
+@pytest.mark.parametrize(
+    "bottom_m, height_m, clearance_m",
+    [
+        (0.0, 2.0, 0.2),
+        (0.0, 0.93, 4.2),  # the hull is from 0.94 to 1.18 m high
+        (0.0, 0.95, 0.2),
+        (1.17, 0.1, 0.2),
+        (1.19, 0.1, 4.2),
+    ],
+)
+@pytest.mark.parametrize("moves", [False, True])
+def test_only_what_the_hull_can_touch_counts(bottom_m, height_m, clearance_m, moves):
+    """A box from x = 5.0 on, 0.5 m from the robot's centre, and a wall 4.5 m away."""
+    box = Box("box", 5.5, 4.5, 1.0, 1.0, height_m, bottom_m=bottom_m)
+    still = MovingObstacle(box, Motion((0.0,), ((5.5, 4.5, 0.0),)))
+    solids, moving = ((), (still,)) if moves else ((box,), ())
+    scene = Scene("room", 9.0, 9.0, 1.0, Walls(), solids, (), moving=moving)
+    log = logged(
+        {"quad0": [(0.0, 4.5, 4.5)]}, surface_distance=Movers(scene).flight_surface_distances_m
+    )
+    assert log.min_clearance_m("quad0") == pytest.approx(clearance_m)
 
 
 def test_equal_stamps_and_interpolation_give_the_same_bits():

@@ -49,6 +49,7 @@ def faults(folder: Path, pixels=((0,),), **changes) -> list:
 
 
 SCALE = {"mode": "scale", "free_thresh": 0.2, "occupied_thresh": 0.6}
+PNG = {"name": "m.png"}
 CLEAR, OPAQUE, GREY, CLEAR_GREY = [0] * 4, [0, 0, 0, 255], [150, 150, 150, 255], [150, 150, 150, 0]
 
 
@@ -69,6 +70,21 @@ CLEAR, OPAQUE, GREY, CLEAR_GREY = [0] * 4, [0, 0, 0, 255], [150, 150, 150, 255],
         # Trinary counts alpha: black and opaque is 255 / 4, a share of 0.75 of black.
         ([[OPAQUE, CLEAR]], {"name": "m.png", "occupied_thresh": 0.8}, [[-1, 100]]),
         ([[0, 99, 100, 254, 255]], {"mode": "raw"}, [[0, 99, 100, 100, -1]]),
+        ([[0, 155, 156, 255]], {"mode": "raw", "negate": 1}, [[-1, 100, 99, 0]]),
+        # Raw leaves alpha out of the mean, which loses its fraction: 298 / 3 is 99.33.
+        ([[[99, 99, 100, 0], [99, 99, 102, 9]]], {"name": "m.png", "mode": "raw"}, [[99, 100]]),
+        # Grey with alpha is loaded as RGBA: (3 * 100 + 255) / 4 is 138.75, and (3 * 205 + 255) / 4
+        # is 217.5, a share of 0.147 of black; without alpha 205 would be unknown.
+        ([[[0, 255], [100, 255], [205, 255], [205, 0]]], PNG, [[100, -1, 0, -1]]),
+        ([[[0, 0], [153, 0], [153, 1]]], {"name": "m.png", **SCALE}, [[100, -1, 50]]),
+        # The last channel decides on transparency, of RGB the blue one. The mean is 100 in both:
+        # 1 + 98 * (155 / 255 - 0.2) / 0.7 is 58.1.
+        (
+            [[[150, 150, 0], [149, 150, 1]]],
+            {"name": "m.png", "mode": "scale", "free_thresh": 0.2, "occupied_thresh": 0.9},
+            [[-1, 58]],
+        ),
+        ([[0, 153, 255]], {**SCALE, "negate": 1, "occupied_thresh": 0.8}, [[0, 66, 100]]),
     ],
 )
 def test_pixels_are_read_as_by_map_server(tmp_path, pixels, given, expected):
@@ -89,9 +105,19 @@ def test_plain_pgm_colour_and_16_bit_png(tmp_path):
     ]
     Image.fromarray(np.array([[0, 65000]], np.uint16)).save(tmp_path / "deep.png")
     assert cells(tmp_path, (tmp_path / "deep.png").read_bytes(), name="m.png") == [[100, 0]]
-    Image.new("P", (1, 1)).save(tmp_path / "palette.png")
-    palette = (tmp_path / "palette.png").read_bytes()
-    assert cells(tmp_path, palette, name="m.png", occupied_thresh=0.7) == [[100]]
+
+
+@pytest.mark.parametrize("ramp, remarks", [(False, 1), (True, 0)])
+def test_the_colours_of_a_palette_count(tmp_path, ramp, remarks):
+    """map_server would take the numbers 0, 1 and 2 of the colours for black."""
+    grey = np.array([[0, 205, 254]], np.uint8)
+    image = Image.fromarray(grey if ramp else np.array([[0, 1, 2]], np.uint8)).convert("P")
+    if not ramp:
+        image.putpalette([0, 0, 0, 205, 205, 205, 254, 254, 254])
+    image.save(tmp_path / "palette.png")
+    path = written(tmp_path, (tmp_path / "palette.png").read_bytes(), "m.png")
+    read = load_map(read_yaml(path), path)
+    assert (read.occupancy.tolist(), len(read.remarks)) == ([[100, -1, 0]], remarks)
 
 
 @pytest.mark.parametrize(

@@ -14,10 +14,10 @@ from quad_nav.sim import obstacles
 from quad_nav.sim.body import World
 from quad_nav.sim.casters import KernelCaster
 from quad_nav.sim.flight import Airframe, BodyState
-from quad_nav.sim.lidar import MOUNT_HEIGHT_M, LidarParams
+from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.motion import Motion
 from quad_nav.sim.obstacles import SHAPES, Box, Cylinder, Obstacle, Sphere
-from quad_nav.sim.scene import MovingObstacle, Scene, Walls
+from quad_nav.sim.scene import MOUNT_HEIGHT_M, MovingObstacle, Scene, Walls
 from quad_nav.sim.scene_file import scene_from_document
 from quad_nav.sim.scene_writer import scene_document
 from quad_nav.topics.markers import scene_markers

@@ -20,6 +20,8 @@ from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.topics.publishing import Names
 from quad_nav.topics.validation import grid_problem
 
+_SAME_TURN = 1e-6
+
 
 class MapListener:
     """Map topic of one static layer."""
@@ -64,6 +66,12 @@ class MapListener:
             self._warnings.warn(
                 f"{self._grid.resolved_name}: map is in frame '{excerpt(frame)}', expected"
                 f" '{wanted}'; using it without a transform"
+            )
+        turn = info.origin.orientation
+        if abs(turn.x) + abs(turn.y) + abs(turn.z) > _SAME_TURN:
+            self._warnings.warn(
+                f"{self._grid.resolved_name}: map's origin is rotated, which costmaps ignore, as"
+                " costmap_2d does: its obstacles are elsewhere; expected an origin without yaw"
             )
         occupancy = np.array(message.data, dtype=np.int8).reshape(spec.shape)
         with self._lock:
