@@ -21,6 +21,7 @@ from quad_nav.errors import InputError
 from quad_nav.files.values import optional, value_faults
 from quad_nav.mission.goal_file import DEFAULT_SETTINGS, SequenceSettings
 from quad_nav.mission.robot_goals import (
+    GoalSource,
     RobotGoals,
     goal_paths,
     last_goal_conflicts,
@@ -68,11 +69,11 @@ None stands for a robot whose parameters are unknown.
 class ScenarioRequest:
     """Sources of scene and goals; values as the user gave them, not yet checked.
 
-    ``scene`` is a file, ``RANDOM``, or "" if the arena is unknown. ``goals`` is a folder, a list
-    of files, or ``RANDOM``. ``seed`` and ``size`` are those of a random mission; size 0 has room
-    for all. ``simulated`` robots have exact odometry, so that every frame of a costmap is ``map``;
-    in other frames of real robots, and of simulated ones whose odometry drifts, a costmap's place
-    is unknown. ``source`` is the request's name in messages.
+    ``scene`` is a file, ``RANDOM``, or "" if the arena is unknown. ``goals`` is a folder, a file, a
+    list of files, or ``RANDOM``. ``seed`` and ``size`` are those of a random mission; size 0 has
+    room for all. ``simulated`` robots have exact odometry, so that every frame of a costmap is
+    ``map``; in other frames of real robots, and of simulated ones whose odometry drifts, a
+    costmap's place is unknown. ``source`` is the request's name in messages.
     """
 
     scene: Any
@@ -135,7 +136,8 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
         *small,
         *_body_cautions(configurations, float(request.robot_radius)),
     )
-    notes = tuple(coverage_notes(configurations))
+    read_as = (f"{one.file.path}: {one.sequence.read_as}" for one in robots if one.sequence.read_as)
+    notes = (*coverage_notes(configurations), *read_as)
     radius_m = float(request.robot_radius)
     scenario = Scenario(scene, tuple(robots), configurations, warnings, radius_m, notes)
     return scenario, list(dict.fromkeys(problems + faults))
@@ -302,7 +304,7 @@ def _read_goals(
     return robots, missing + faults
 
 
-def _goal_files(request: ScenarioRequest) -> Tuple[Dict[int, Path], List[str]]:
+def _goal_files(request: ScenarioRequest) -> Tuple[Dict[int, GoalSource], List[str]]:
     """Return the existing goal files, by the robots' numbers, and a fault for those missing."""
     goals, count = request.goals, request.robots
     if goals is None or not count:
@@ -313,7 +315,7 @@ def _goal_files(request: ScenarioRequest) -> Tuple[Dict[int, Path], List[str]]:
     if len(goals) != count:
         place = f"{request.source}: goals" if request.source else "goals"
         problems = [f"{place}: lists {len(goals)} files; expected one for each of {count} robots"]
-    return {number: Path(path).expanduser() for number, path in enumerate(goals)}, problems
+    return {k: GoalSource(Path(path).expanduser()) for k, path in enumerate(goals)}, problems
 
 
 def tried(read: Callable[[], T], problems: List[str]) -> Optional[T]:
