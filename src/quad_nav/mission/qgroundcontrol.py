@@ -68,7 +68,7 @@ def read_wpl(text: str) -> Mission:
         cells = [number_of(cell) for cell in line.split()]
         if len(cells) == 12 and None not in cells:
             items.append(_Item(cells[3], cells[2], cells[4:11], number))
-        elif cells:
+        elif cells and not line.lstrip().startswith("#"):
             problems.append(f"line {number}: {line.strip()!r}; expected 12 numbers")
     if problems:
         raise InputError(problems)

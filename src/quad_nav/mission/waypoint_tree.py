@@ -57,15 +57,13 @@ def read_documents(text: str) -> List[Tree]:
     """
     if text.lstrip()[:1] in ("{", "["):
         text = text.replace("\t", " ")  # JSON allows tabs between its values
-    loader = PlainLoader(text)
     trees: List[Tree] = []
     try:
+        loader = PlainLoader(text)
         while loader.check_node():
             trees.append(_tree(loader, loader.get_node()))
     except yaml.YAMLError as error:
         raise InputError([yaml_fault(error)]) from error
-    finally:
-        loader.dispose()
     return [one for one in trees if one.value is not None]
 
 

@@ -206,6 +206,8 @@ def test_a_robot_of_a_fleet_is_named():
 HOME = (47.0, 8.0)
 WPL = """QGC WPL 110
 0\t1\t0\t16\t0\t0\t0\t0\t47.0\t8.0\t400\t1
+
+# take off
 1\t0\t3\t22\t0\t0\t0\t0\t0\t0\t10\t1
 2\t0\t3\t16\t5\t0\t0\t0\t47.0009\t8.0\t10\t1
 3\t0\t3\t16\t0\t0\t0\t90\t47.0\t8.0013\t10\t1
@@ -289,12 +291,13 @@ def test_the_first_waypoint_is_the_datum_without_home():
         ("QGC WPL 110\n0 1 0 16\n", "line 2: '0 1 0 16'; expected 12 numbers"),
         (
             WPL.replace("\t3\t16", "\t2\t16", 1),
-            "line 4 (goal 1): lat 47.0009, lon 8.0 in frame 2.0",
+            "line 6 (goal 1): lat 47.0009, lon 8.0 in frame 2.0",
         ),
         (plan([item(16, 0, 0)]), "line 5 (goal 1): lat 0, lon 0 in frame 3; expected degrees"),
         (plan([{"complexItemType": "survey"}]), "line 5: survey without seven params"),
         (TUW.replace("robot_0\n", ""), "line 4: a goal; expected the name of its robot before it"),
         (TUW + "robot_2\n", "robot_2: has no goals; expected one"),
+        ("a: \x00", "not YAML: unacceptable character"),
         ("x,y\n", "has 0 waypoints; expected 1 to 10000"),
         ("lat,lon\n91,8\n", "line 2 (goal 1): lat 91, lon 8; expected degrees"),
     ],
