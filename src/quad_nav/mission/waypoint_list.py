@@ -132,7 +132,7 @@ def _read(text: str) -> Optional[WaypointList]:
     if start.startswith(TUW):
         return WaypointList("goals of tuw_multi_robot", tuple(read_tuw(text)))
     if start[:1] in ("{", "["):
-        return _read_tree(text, "JSON") if _is_json_of_others(text) else None
+        return _read_tree(text, "JSON") if _is_of_others(text) else None
     if not start or start.startswith('"goals"'):
         return None
     table = read_table(text)
@@ -181,14 +181,17 @@ def _degrees(record: Record) -> Optional[Position]:
     return lat, lon
 
 
-def _is_json_of_others(text: str) -> bool:
-    """Return whether a JSON text is no goal file of ours, nor one with a mistake.
+def _is_of_others(text: str) -> bool:
+    """Return whether a text in braces is no goal file of ours, nor one with a mistake.
 
-    A goal file has ``goals``, and they have no keys of messages such as theta or position.
+    A goal file has ``goals``, and they have no keys of messages such as theta or position. YAML may
+    begin as JSON does.
     """
     try:
         tree = json.loads(text, parse_int=float)
-    except (ValueError, RecursionError):
+    except ValueError:
+        return '"goals"' not in text
+    except RecursionError:
         return False
     if not isinstance(tree, dict) or "goals" not in tree:
         return True

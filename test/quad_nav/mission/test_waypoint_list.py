@@ -92,6 +92,7 @@ goal: {{target_pose: {{pose: {{{POSE_2}, {ROTATION_2}}}}}}}
         {"goals": [{"x": 1, "y": 2, "theta": 0}, {"x": 3, "y": -4, "theta": math.pi / 2}]}
     ),
     "JSON list with tabs": f"[\n\t[1, 2, 0],\n\t[3, -4, {math.pi / 2}]\n]",
+    "YAML in braces": f"[\n{{X: 1, Y: 2, theta: 0}},\n{{X: 3, Y: -4, theta: {math.pi / 2}}}\n#]\n]",
     "follow_waypoints": f"1.0,2.0,0.0,0.0,0.0,0.0,1.0\n3.0,-4.0,0.0,0.0,0.0,{HALF},{HALF}\n",
     "seven columns and more": f"1,2,0,0,0,0,1,0,3\n3,-4,0,0,0,{HALF},{HALF},0,3\n",
     "x, y, yaw": f"1 2 0\n3 -4 {math.pi / 2}\n",
