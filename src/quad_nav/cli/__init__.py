@@ -32,6 +32,7 @@ COMMANDS: Dict[str, Tuple[str, str]] = {
     "check": ("quad_nav", "Check move_base's YAML without flying."),
     "circle": ("quad_bench", "Let robots on a circle swap sides, beside ORCA."),
     "fly": ("quad_nav", "Fly a mission without ROS, as fast as the machine allows."),
+    "goals": ("quad_nav", "Convert other people's lists of waypoints to goal files."),
     "preview": ("quad_nav", "Show a mission before anything flies, and edit its goals."),
     "replay": ("quad_web", "Play a recorded flight on a page in the browser."),
     "report": ("quad_nav", "Write a report of a recorded flight, or compare several."),

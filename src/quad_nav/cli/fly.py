@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from quad_nav.cli.options import A_FILE, A_FOLDER, AMOUNT, OUTPUT, POSITIVE, web_options
+from quad_nav.cli.options import A_FILE, A_FOLDER, A_PATH, AMOUNT, OUTPUT, POSITIVE, web_options
 
 # Those of quad_nav.sim.simulation and .flight; importing them would load the engine.
 LIDAR_CASTERS = ("kernel", "bullet")
@@ -22,8 +22,9 @@ AIRFRAMES = ("default", "arducopter")
 )
 @click.option(
     "--goals",
-    type=A_FOLDER,
-    help="Folder with quad0_goals.json and so on. [default: the shipped goals]",
+    type=A_PATH,
+    help="Folder with quad0_goals.json and so on, or a file of goals or waypoints. [default: the"
+    " shipped goals]",
 )
 @click.option(
     "--config",

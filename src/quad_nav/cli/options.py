@@ -17,6 +17,7 @@ from quad_nav.files import plain_yaml
 from quad_nav.files.document import yaml_fault
 
 A_FILE = click.Path(dir_okay=False, path_type=Path)
+A_PATH = click.Path(path_type=Path)
 A_FOLDER = click.Path(file_okay=False, path_type=Path)
 POSITIVE = click.FloatRange(min=0.0, min_open=True)
 AMOUNT = click.FloatRange(min=0.0)

@@ -1,9 +1,9 @@
 """Goal files: ``{"goals": [[x, y], [x, y, yaw], ...]}``, metres and radians in ``map``.
 
 A goal with further settings is an object: ``{"x": 1.0, "y": 2.0, "yaw": null, "wait_s": 5.0}``.
-A file with a fault is refused as a whole. The error lists every fault as ``file: place: what is
-wrong; what was expected``. ``goals/schema.json`` describes the format for editors,
-``docs/goals.md`` for people.
+Other people's lists of waypoints are read as well, see ``waypoint_list``. A file with a fault is
+refused as a whole. The error lists every fault as ``file: place: what is wrong; what was
+expected``. ``goals/schema.json`` describes the format for editors, ``docs/goals.md`` for people.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from quad_nav.mission.goal import (
     read_goal,
     show,
 )
+from quad_nav.mission.waypoint_list import WaypointList, read_waypoints
 
 MAX_BYTES = 4 * 1024 * 1024
 MAX_GOALS = 10_000
@@ -67,10 +68,11 @@ DEFAULT_SETTINGS = SequenceSettings()
 
 @dataclass(frozen=True)
 class GoalSequence:
-    """Content of a goal file."""
+    """Content of a goal file; ``read_as`` says so of a list of waypoints, "" for a goal file."""
 
     goals: Tuple[Goal, ...]
     settings: SequenceSettings = DEFAULT_SETTINGS
+    read_as: str = ""
 
     def tolerance_m(self, goal: Goal) -> float:
         """Return the distance from a goal within which it counts as reached."""
@@ -129,13 +131,15 @@ def load_goals(
     path: Union[str, Path],
     check_place: Optional[PlaceCheck] = None,
     defaults: SequenceSettings = DEFAULT_SETTINGS,
+    robot: int = 0,
 ) -> GoalSequence:
-    """Read a goal file.
+    """Read a goal file, or a list of waypoints.
 
     Args:
         path: The file.
         check_place: Check for the positions of goals.
         defaults: Settings that the file does not give.
+        robot: Which of the robots of a list of waypoints.
 
     Returns:
         The goals as in the file, see ``parse_goals``.
@@ -143,7 +147,7 @@ def load_goals(
     Raises:
         InputError: The file cannot be read, or has faults; lists all of them.
     """
-    return parse_goals(read_bytes(Path(path), MAX_BYTES), str(path), check_place, defaults)
+    return parse_goals(read_bytes(Path(path), MAX_BYTES), str(path), check_place, defaults, robot)
 
 
 def parse_goals(
@@ -151,14 +155,16 @@ def parse_goals(
     name: str,
     check_place: Optional[PlaceCheck] = None,
     defaults: SequenceSettings = DEFAULT_SETTINGS,
+    robot: int = 0,
 ) -> GoalSequence:
-    """Parse the content of a goal file.
+    """Parse the content of a goal file, or of a list of waypoints.
 
     Args:
         content: The content, UTF-8 if bytes.
         name: Name of the file, for messages.
         check_place: Check for the positions of goals.
         defaults: Settings that the content does not give.
+        robot: Which of the robots of a list of waypoints.
 
     Returns:
         The goals as in the file, nothing added or moved: the page writes them back.
@@ -166,7 +172,11 @@ def parse_goals(
     Raises:
         InputError: The content has faults; lists all of them.
     """
-    tree, problems = _decode(content, name)
+    text = decoded(content, name)
+    waypoints = read_waypoints(text, name)
+    if waypoints is not None:
+        return goals_of(waypoints, name, check_place, defaults, robot)
+    tree, problems = _tree(text, name)
     if not isinstance(tree, dict):
         raise InputError([f'{name}: is {_kind(tree)}; expected {{"goals": [[x, y], ...]}}'])
     problems += [_unknown_key(name, key) for key in tree if key not in KEYS]
@@ -231,7 +241,58 @@ def clearance_check(
     return check
 
 
-def _decode(content: Union[bytes, str], name: str) -> Tuple[Any, List[str]]:
+def goals_of(
+    waypoints: WaypointList,
+    name: str,
+    check_place: Optional[PlaceCheck] = None,
+    defaults: SequenceSettings = DEFAULT_SETTINGS,
+    robot: int = 0,
+) -> GoalSequence:
+    """Return the goals of one robot of a list of waypoints; the arguments are ``parse_goals``'s.
+
+    Raises:
+        InputError: Its waypoints have faults, or there is no such robot.
+    """
+    if robot >= len(waypoints.robots):
+        count = len(waypoints.robots)
+        expected = f"expected one for each of {robot + 1} robots or more"
+        raise InputError([f"{name}: has goals of {count} robot{'s' * (count > 1)}; {expected}"])
+    entries = waypoints.entries(robot)
+    if not 0 < len(entries) <= MAX_GOALS:
+        raise InputError([f"{name}: has {len(entries)} waypoints; expected 1 to {MAX_GOALS}"])
+    goals: List[Goal] = []
+    problems: List[str] = []
+    for number, (value, place, faults) in enumerate(entries, 1):
+        where = f"{name}: {place} (goal {number})"
+        problems += [where + fault for fault in faults]
+        if not faults:
+            problems += _add_goal(goals, value, where, check_place)
+    if problems:
+        raise InputError(problems)
+    read_as = waypoints.line(robot)
+    spread_m = max(math.dist((goals[0].x_m, goals[0].y_m), (one.x_m, one.y_m)) for one in goals)
+    if 0.0 < spread_m < defaults.goal_tolerance_m:
+        read_as += f"; all of them within {spread_m:.2g} m: expected metres"
+    return GoalSequence(tuple(goals), defaults, read_as)
+
+
+def decoded(content: Union[bytes, str], name: str) -> str:
+    """Return the text of a file.
+
+    Raises:
+        InputError: It is too long, or not UTF-8.
+    """
+    if len(content) > MAX_BYTES:
+        raise InputError([f"{name}: has {len(content)} bytes; expected {MAX_BYTES} at most"])
+    try:
+        return content.decode("utf-8-sig") if isinstance(content, bytes) else content
+    except UnicodeDecodeError as error:
+        raise InputError(
+            [f"{name}: byte {error.start} is not UTF-8; expected a JSON text"]
+        ) from error
+
+
+def _tree(text: str, name: str) -> Tuple[Any, List[str]]:
     """Decode JSON with every number a float; also return a fault for each repeated key."""
     problems: List[str] = []
 
@@ -243,14 +304,6 @@ def _decode(content: Union[bytes, str], name: str) -> Tuple[Any, List[str]]:
             tree[key] = value
         return tree
 
-    if len(content) > MAX_BYTES:
-        raise InputError([f"{name}: has {len(content)} bytes; expected {MAX_BYTES} at most"])
-    try:
-        text = content.decode("utf-8-sig") if isinstance(content, bytes) else content
-    except UnicodeDecodeError as error:
-        raise InputError(
-            [f"{name}: byte {error.start} is not UTF-8; expected a JSON text"]
-        ) from error
     # The tutorial prints its goal files without the outer braces.
     bare = text.lstrip().startswith('"goals"')
     try:
@@ -284,14 +337,21 @@ def _read_goals(
     problems: List[str] = []
     for index, entry in enumerate(entries):
         place = f"{name}: goals[{index}] (goal {index + 1})"
-        faults = list(goal_faults(entry))
-        if not faults:
-            goal = read_goal(entry)
-            goals.append(goal)
-            fault = check_place(goal.x_m, goal.y_m) if check_place else None
-            faults = [f": ({goal.x_m:g}, {goal.y_m:g}) {fault}"] if fault else []
-        problems += [place + fault for fault in faults]
+        problems += _add_goal(goals, entry, place, check_place)
     return goals, problems
+
+
+def _add_goal(
+    goals: List[Goal], entry: Any, place: str, check_place: Optional[PlaceCheck]
+) -> List[str]:
+    """Add the goal of an entry, if its values are good, and return its faults."""
+    faults = list(goal_faults(entry))
+    if not faults:
+        goal = read_goal(entry)
+        goals.append(goal)
+        fault = check_place(goal.x_m, goal.y_m) if check_place else None
+        faults = [f": ({goal.x_m:g}, {goal.y_m:g}) {fault}"] if fault else []
+    return [place + fault for fault in faults]
 
 
 def _loop_faults(sequence: GoalSequence, name: str) -> List[str]:

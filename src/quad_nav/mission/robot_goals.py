@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import itertools
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 from quad_nav.errors import InputError
-from quad_nav.files.user_files import read_bytes
+from quad_nav.files.user_files import read_bytes, read_text
 from quad_nav.mission.goal_file import (
     DEFAULT_SETTINGS,
     MAX_BYTES,
@@ -18,6 +19,16 @@ from quad_nav.mission.goal_file import (
     SequenceSettings,
     load_goals,
 )
+from quad_nav.mission.waypoint_list import read_waypoints
+
+_SUFFIXES = {".json", ".yaml", ".yml", ".csv", ".txt", ".plan", ".waypoints"}
+
+
+class GoalSource(NamedTuple):
+    """A file with goals, and which of the robots in it."""
+
+    path: Path
+    robot: int = 0
 
 
 class WatchedGoalFile:
@@ -28,8 +39,11 @@ class WatchedGoalFile:
         path: Union[str, Path],
         check_place: Optional[PlaceCheck] = None,
         defaults: SequenceSettings = DEFAULT_SETTINGS,
+        robot: int = 0,
     ) -> None:
+        """Keep what ``load_goals`` needs; ``robot`` is the one of those in the file."""
         self.path = Path(path)
+        self._robot = robot
         self._check_place = check_place
         self._defaults = defaults
         self._checked: Optional[bytes] = None
@@ -42,7 +56,7 @@ class WatchedGoalFile:
             InputError: The file cannot be read, or has faults; lists all of them.
         """
         self._checked = self._seen = self._content()
-        return load_goals(self.path, self._check_place, self._defaults)
+        return load_goals(self.path, self._check_place, self._defaults, self._robot)
 
     def poll(self) -> Optional[GoalSequence]:
         """Return the new sequence if the file has changed, else None.
@@ -58,7 +72,7 @@ class WatchedGoalFile:
         if not is_stable or content == self._checked:
             return None
         self._checked = content
-        return load_goals(self.path, self._check_place, self._defaults)
+        return load_goals(self.path, self._check_place, self._defaults, self._robot)
 
     def _content(self) -> Optional[bytes]:
         # A missing file counts as a change; load_goals raises the error.
@@ -77,32 +91,90 @@ class RobotGoals:
     sequence: GoalSequence
 
 
-def goal_paths(folder: Path, robots: int) -> Tuple[Dict[int, Path], List[str]]:
-    """Find ``quad0_goals.json`` and so on in a folder.
+def goal_paths(
+    goals: Path, robots: Optional[int] = None
+) -> Tuple[Dict[int, GoalSource], List[str]]:
+    """Find the goals of robots in a folder, or in one file.
+
+    Args:
+        goals: A folder with ``quad0_goals.json`` and so on, or with the lists of waypoints of
+            robots, by the numbers in their names or by their names; or a file, which may have the
+            waypoints of several robots.
+        robots: Number of robots; None for as many as have goals.
 
     Returns:
-        The existing files, by the robots' numbers, and a fault for those missing.
+        The files, by the robots' numbers, and a fault for those missing.
     """
-    if not folder.is_dir():
+    if goals.is_file():
+        found = _sources(goals)
+        return dict(enumerate(found[:robots])), _too_few(goals, len(found), robots)
+    if not goals.is_dir():
         return {}, [
-            f"goals: folder {folder} does not exist; expected one with quad0_goals.json and so on"
+            f"goals: folder {goals} does not exist; expected one with quad0_goals.json and so on"
         ]
-    paths = {number: folder / f"quad{number}_goals.json" for number in range(robots)}
-    missing = [path.name for path in paths.values() if not path.exists()]
+    found = [] if any(goals.glob("quad*_goals.json")) else _sources_in(goals)
+    if not found:
+        return _named_paths(goals, robots)
+    return dict(enumerate(found[:robots])), _too_few(goals, len(found), robots)
+
+
+def _named_paths(folder: Path, robots: Optional[int]) -> Tuple[Dict[int, GoalSource], List[str]]:
+    """Return the goal files with our names, those before the first gap if ``robots`` is None."""
+    if robots is None:
+        robots = 1
+        while (folder / f"quad{robots}_goals.json").exists():
+            robots += 1
+    wanted = [folder / f"quad{number}_goals.json" for number in range(robots)]
+    paths = {k: GoalSource(path) for k, path in enumerate(wanted) if path.exists()}
+    missing = [path.name for path in wanted if not path.exists()]
     if not missing:
         return paths, []
     present = sorted(path.name for path in folder.glob("*.json")) or ["no JSON file"]
-    return (
-        {number: path for number, path in paths.items() if path.exists()},
-        [
-            f"{folder}: has no {_listed(missing)}; expected a goal file for each of {robots} "
-            f"robots; the folder has {_listed(present)}"
-        ],
-    )
+    return paths, [
+        f"{folder}: has no {_listed(missing)}; expected a goal file for each of {robots} "
+        f"robots; the folder has {_listed(present)}"
+    ]
+
+
+def _sources_in(folder: Path) -> List[GoalSource]:
+    """Return the robots of the lists of waypoints in a folder, by the numbers in the files' names.
+
+    Files without numbers come in the order of their names.
+    """
+    known = (path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES)
+    files = sorted(path for path in known if _has_goals(path))
+    numbers = {path: [int(one) for one in re.findall(r"\d+", path.stem)] for path in files}
+    if all(numbers.values()):
+        files.sort(key=lambda path: numbers[path])
+    return [one for path in files for one in _sources(path)]
+
+
+def _has_goals(path: Path) -> bool:
+    """Return whether a file of a folder has goals, perhaps with faults."""
+    try:
+        text = read_text(path, MAX_BYTES)
+        return read_waypoints(text, str(path)) is not None or '"goals"' in text
+    except InputError:
+        return True
+
+
+def _sources(path: Path) -> List[GoalSource]:
+    """Return the robots of a file; one for a goal file, and for a file with faults."""
+    try:
+        waypoints = read_waypoints(read_text(path, MAX_BYTES), str(path))
+    except InputError:
+        return [GoalSource(path)]
+    return [GoalSource(path, k) for k in range(len(waypoints.robots) if waypoints else 1)]
+
+
+def _too_few(goals: Path, found: int, robots: Optional[int]) -> List[str]:
+    if robots is None or found >= robots:
+        return []
+    return [f"{goals}: has goals of {found} robot{'s' * (found != 1)}; expected {robots}, --robots"]
 
 
 def load_robot_goals(
-    paths: Mapping[int, Path],
+    paths: Mapping[int, GoalSource],
     checks: Mapping[int, PlaceCheck] = MappingProxyType({}),
     settings: Mapping[int, SequenceSettings] = MappingProxyType({}),
 ) -> Tuple[List[RobotGoals], List[str]]:
@@ -118,8 +190,9 @@ def load_robot_goals(
     """
     robots: List[RobotGoals] = []
     problems: List[str] = []
-    for number, path in paths.items():
-        file = WatchedGoalFile(path, checks.get(number), settings.get(number, DEFAULT_SETTINGS))
+    for number, (path, robot) in paths.items():
+        own = settings.get(number, DEFAULT_SETTINGS)
+        file = WatchedGoalFile(path, checks.get(number), own, robot)
         try:
             robots.append(RobotGoals(f"quad{number}", file, file.load()))
         except InputError as error:

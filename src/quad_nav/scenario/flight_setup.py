@@ -14,7 +14,7 @@ from quad_nav.config.sources import config_label
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
 from quad_nav.files.values import value_faults
-from quad_nav.mission.robot_goals import RobotGoals
+from quad_nav.mission.robot_goals import RobotGoals, goal_paths
 from quad_nav.scenario import RANDOM
 from quad_nav.scenario.coverage import scene_bounds
 from quad_nav.scenario.rules import RULES, steps_per_scan
@@ -38,7 +38,7 @@ class FlightOptions:
 
     Attributes:
         scene: Scene file; None for the shipped arena, or a random mission if ``goals`` is None.
-        goals: Folder of goal files; None for the shipped ones, or a random mission.
+        goals: Folder or file of goals; None for the shipped ones, or a random mission.
         config: A shipped configuration, a folder or files, see ``config.sources``.
         parameters: (path, value) on top of it, as ("global_costmap/width", 60.0).
         robots: Number of robots; None for as many as ``goals`` has files.
@@ -172,9 +172,7 @@ def with_default_files(options: FlightOptions) -> FlightOptions:
     if scene is None and goals is not None:
         scene = shipped("scenes", "arena.yaml")
     if robots is None:
-        robots = 1
-        while goals is not None and (goals / f"quad{robots}_goals.json").exists():
-            robots += 1
+        robots = 1 if goals is None else len(goal_paths(goals.expanduser())[0]) or 1
     return replace(options, scene=scene, goals=goals, robots=robots)
 
 

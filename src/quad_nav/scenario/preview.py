@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Dict, List, Optional, Sequence, Tuple
+from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.goal_file import GoalSequence, PlaceCheck, load_goals
-from quad_nav.mission.robot_goals import goal_paths
+from quad_nav.mission.robot_goals import GoalSource, goal_paths
 from quad_nav.scenario.flight_setup import (
     FlightOptions,
     read_readable_parts,
@@ -89,8 +89,9 @@ class MissionPreview:
         self.files: Dict[int, Path] = {}
         options = with_default_files(options)
         if options.goals is not None:
-            self.files, _ = goal_paths(Path(options.goals).expanduser(), options.robots or 1)
-            self._read_faulty_files()
+            sources, _ = goal_paths(Path(options.goals).expanduser(), options.robots or 1)
+            self.files = {number: source.path for number, source in sources.items()}
+            self._read_faulty_files(sources)
 
     def _starting(self, seed: int) -> Tuple[Obstacle, ...]:
         """Return the moving obstacles where they start; note if there is no room for people."""
@@ -102,12 +103,12 @@ class MissionPreview:
             self.problems += tuple(error.problems)
             return ()
 
-    def _read_faulty_files(self) -> None:
+    def _read_faulty_files(self, sources: Mapping[int, GoalSource]) -> None:
         """Read the goals of files in which only positions are faulty."""
-        for number, path in self.files.items():
+        for number, (path, robot) in sources.items():
             if number not in self._sequences:
                 try:
-                    self._sequences[number] = load_goals(path)
+                    self._sequences[number] = load_goals(path, robot=robot)
                 except InputError:
                     continue  # its faults are among the problems
 

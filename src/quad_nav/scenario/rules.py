@@ -69,7 +69,7 @@ RULES: Dict[str, Rule] = {
     # Scene, goals and configurations.
     "scene": text(f"a scene file such as scenes/arena.yaml, or {RANDOM}"),
     "goals": Rule(
-        _is_path_or_paths, "a folder with quad0_goals.json and so on, or a list of files"
+        _is_path_or_paths, "a folder with quad0_goals.json and so on, a file, or a list of files"
     ),
     "config": text("a folder of YAML files, or the name of a shipped one"),
     "body_radius": number(above=0, unit="metres"),

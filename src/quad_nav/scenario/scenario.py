@@ -22,6 +22,7 @@ from quad_nav.errors import InputError
 from quad_nav.files.values import optional, value_faults
 from quad_nav.mission.goal_file import DEFAULT_SETTINGS, SequenceSettings, load_goals
 from quad_nav.mission.robot_goals import (
+    GoalSource,
     RobotGoals,
     goal_paths,
     last_goal_conflicts,
@@ -70,11 +71,11 @@ None stands for a robot whose parameters are unknown.
 class ScenarioRequest:
     """Sources of scene and goals; values as the user gave them, not yet checked.
 
-    ``scene`` is a file, ``RANDOM``, or "" if the arena is unknown. ``goals`` is a folder, a list
-    of files, or ``RANDOM``. ``seed`` and ``size`` are those of a random mission; size 0 has room
-    for all. ``simulated`` robots have exact odometry, so that every frame of a costmap is ``map``;
-    in other frames of real robots, and of simulated ones whose odometry drifts, a costmap's place
-    is unknown. ``source`` is the request's name in messages.
+    ``scene`` is a file, ``RANDOM``, or "" if the arena is unknown. ``goals`` is a folder, a file, a
+    list of files, or ``RANDOM``. ``seed`` and ``size`` are those of a random mission; size 0 has
+    room for all. ``simulated`` robots have exact odometry, so that every frame of a costmap is
+    ``map``; in other frames of real robots, and of simulated ones whose odometry drifts, a
+    costmap's place is unknown. ``source`` is the request's name in messages.
     """
 
     scene: Any
@@ -138,7 +139,8 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
         *(map_warnings(scene, configurations, bool(request.source)) if scene else ()),
         *_body_cautions(configurations, float(request.robot_radius)),
     )
-    notes = tuple(coverage_notes(configurations))
+    read_as = (f"{one.file.path}: {one.sequence.read_as}" for one in robots if one.sequence.read_as)
+    notes = (*coverage_notes(configurations), *read_as)
     radius_m = float(request.robot_radius)
     scenario = Scenario(scene, tuple(robots), configurations, warnings, radius_m, notes)
     return scenario, list(dict.fromkeys(problems + faults))
@@ -188,9 +190,10 @@ def scene_of(values: Mapping[str, Any]) -> Scene:
 def _first_goals(values: Mapping[str, Any]) -> List[Optional[Tuple[float, float]]]:
     """Return the place of each robot's first goal, None if no file that can be read has it."""
     goals = {}
-    for number, path in _goal_files(values.get("goals"), values.get("robots"))[0].items():
+    files, _ = _goal_files(values.get("goals"), values.get("robots"))
+    for number, (path, robot) in files.items():
         with contextlib.suppress(InputError):  # its faults are told when the mission is read
-            for first in load_goals(path).goals[:1]:
+            for first in load_goals(path, robot=robot).goals[:1]:
                 goals[number] = (first.x_m, first.y_m)
     return [goals.get(number) for number in range(max(goals, default=-1) + 1)]
 
@@ -317,7 +320,9 @@ def _read_goals(
     return robots, missing + faults
 
 
-def _goal_files(goals: Any, count: Any, source: str = "") -> Tuple[Dict[int, Path], List[str]]:
+def _goal_files(
+    goals: Any, count: Any, source: str = ""
+) -> Tuple[Dict[int, GoalSource], List[str]]:
     """Return the existing goal files, by the robots' numbers, and a fault for those missing."""
     if not goals or not count:
         return {}, []
@@ -327,7 +332,7 @@ def _goal_files(goals: Any, count: Any, source: str = "") -> Tuple[Dict[int, Pat
     if len(goals) != count:
         place = f"{source}: goals" if source else "goals"
         problems = [f"{place}: lists {len(goals)} files; expected one for each of {count} robots"]
-    return {number: Path(path).expanduser() for number, path in enumerate(goals)}, problems
+    return {k: GoalSource(Path(path).expanduser()) for k, path in enumerate(goals)}, problems
 
 
 def tried(read: Callable[[], T], problems: List[str]) -> Optional[T]:

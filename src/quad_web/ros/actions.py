@@ -50,7 +50,8 @@ class FlightActions(GoalEditing):
             for i in self._robots
         ]
         self._parameters = NavigatorParameters(source.trees)
-        self._files = GoalFiles(goal_paths(goals, robots)[0], self._check_of)
+        files = {k: one.path for k, one in goal_paths(goals, robots)[0].items()}
+        self._files = GoalFiles(files, self._check_of)
         self._checks: Dict[int, Any] = {}  # with what they were made of
 
     # -- time ----------------------------------------------------------------------------

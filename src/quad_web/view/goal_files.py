@@ -99,9 +99,11 @@ class GoalFiles:
         path = str(self.files[robot])
         try:
             content = read_bytes(self.files[robot], MAX_BYTES)
-            goals = [
-                (goal.x_m, goal.y_m, goal.yaw_rad) for goal in parse_goals(content, path).goals
-            ]
+            sequence = parse_goals(content, path)
+            if sequence.read_as:
+                expected = "expected a goal file to edit, as of quad goals convert"
+                raise InputError([f"{path}: {sequence.read_as}; {expected}"])
+            goals = [(goal.x_m, goal.y_m, goal.yaw_rad) for goal in sequence.goals]
         except InputError as error:
             return GoalFileView(robot, path, "", [], "; ".join(error.problems))
         return GoalFileView(robot, path, version_of(content), goals)

@@ -115,7 +115,7 @@ def test_goals_at_one_place_are_a_loop_if_they_differ_in_yaw():
         ('"goals": [[1,2],x]', ":1:17: is not JSON: Expecting value"),
         (b"\xff", ": byte 0 is not UTF-8"),
         ("[" * 100000, ": is nested too deeply"),
-        ("[[1, 2]]", ": is a list; expected {"),
+        ("[1]", ": is a list; expected {"),
         ("{}", ": has no goals"),
         ('{"goals": 3}', ": goals: is 3; expected a list"),
         ('{"goals": []}', ": goals: is empty; expected at least one goal"),
