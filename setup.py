@@ -33,7 +33,7 @@ setuptools.setup(
         "": ["py.typed"],
         "quad_nav": ["*.pyi"],
         "quad_nav.config": ["*.pyi"],
-        "quad_nav.report": ["*.jinja"],
+        "quad_nav.report": ["*.css", "*.jinja"],
         "quad_tune.report": ["*.jinja"],
         "quad_web": ["static/*"],
     },

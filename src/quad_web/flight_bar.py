@@ -106,7 +106,7 @@ class FlightBar:
         client = self._client
         with ui.element("div").classes("controls"):
             self._play = ui.button(icon="play_arrow", on_click=self._toggle)
-            self._play.props("flat dense data-testid=play aria-label='start or pause'")
+            self._play.props("flat dense no-caps data-testid=play")
             reset = ui.button(icon="restart_alt", on_click=lambda: client.call("reset"))
             reset.props("flat dense data-testid=reset aria-label=reset")
             reset.props["title"] = "Every robot back to its start pose"
@@ -157,11 +157,15 @@ class FlightBar:
             self._scrub_time.text = f"{clock_text(time_s)} / {clock_text(duration_s)}"
 
     def _show_play(self, state: str) -> None:
+        """Show the one thing that the button does: pause, start, or resume after a stop."""
         name = "pause" if state in ("starting", "running") else "start"
-        if self._shown.get("play") != name:
-            self._shown["play"] = name
+        text = "Resume" if state == "stopped" else name.capitalize()
+        if self._shown.get("play") != text:
+            self._shown["play"] = text
+            self._play.text = text if state == "stopped" else ""
             self._play.props["icon"] = "pause" if name == "pause" else "play_arrow"
-            self._play.props["title"] = why_idle(self._client, name) or name.capitalize()
+            self._play.props["title"] = why_idle(self._client, name) or text
+            self._play.props["aria-label"] = text
             self._play.set_enabled(not self._client.refusal(name))
             self._play.update()
 
@@ -174,7 +178,7 @@ class FlightBar:
     # -- what it does ----------------------------------------------------------------
 
     async def _toggle(self) -> None:
-        await self._client.call(self._shown.get("play", "start"))
+        await self._client.call("pause" if self._shown.get("play") == "Pause" else "start")
         self.refresh()
 
     async def _set_rate(self) -> None:

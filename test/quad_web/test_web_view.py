@@ -254,13 +254,29 @@ def test_a_cancelled_goal_is_skipped(tmp_path):
     assert actions.done[0].endswith("quad0: goal cancelled")
 
 
-def test_stop_all_ends_the_flight():
-    summary, actions, page, _ = flown(setup_of(), {40: lambda page: page.do("stop_all")})
-    assert summary.reason == STOPPED and summary.sim_time_s < 1.2
-    assert page.state.item("flight").data["state"] == "ended"
+def test_stopped_quadcopters_hover_until_they_are_resumed(tmp_path):
+    goals = write_goals(tmp_path / "g", [[3.0, 3.0]], [[9.0, 3.5]])
+    seen = []
+
+    def look(page):
+        rows = page.state.item("status").data["rows"]
+        seen.append((page.state.item("flight").data["state"], {row["state"] for row in rows}))
+        seen.append({row["reason"] for row in rows})
+        page.do("start")
+
+    doings = {40: lambda page: page.do("stop_all"), 160: look}
+    summary, actions, page, track = flown(setup_of(goals, time_limit_s=60.0), doings)
+    assert seen == [("stopped", {"stopped"}), {STOPPED}]
+    speeds_mps = np.hypot(*np.array(track.rows)[:, :, 7:9].transpose(2, 0, 1))
+    assert speeds_mps[35].min() > 0.2 and speeds_mps[100:160].max() < 0.05
+    assert summary.success and summary.sim_time_s > 4.0
+    assert [line.split(": ")[1] for line in actions.done] == [
+        "missions stopped",
+        "missions resumed",
+    ]
     refused = actions.call("cancel", 0)
     assert not refused.ok and "has ended" in refused.text
-    assert actions.call("reset").ok and actions.stop_reason == STARTED_AGAIN
+    assert actions.call("start").ok and actions.stop_reason == STARTED_AGAIN
 
 
 @pytest.mark.parametrize("processes", [1, 2])

@@ -192,6 +192,7 @@ class Web(FlightCase):
         self.wait(lambda: min(self.speed(0), self.speed(1)) > 0.2, "both flying")
         self.assertIn("every quadcopter hovers", self.do("stop_all"))
         self.wait(lambda: max(self.speed(0), self.speed(1)) < 0.05, "both hovering")
+        self.wait(lambda: self.flight("state") == "stopped", "a stopped flight")
         self.wait(lambda: self.page.row(0)["state"] == "stopped", "the state")
         x, y = self.position(0)
         to = x, y + (1.2 if y < 5.0 else -1.2)
@@ -201,6 +202,7 @@ class Web(FlightCase):
         self.assertIn("arena", self.refuse("send_goal", 0, Pose2D(100.0, 3.0, 0.0)))
         self.assertIn("quad7", self.refuse("send_goal", 7, Pose2D(3.0, 3.0, 0.0)))
         self.assertIn("resumed", self.do("start"))
+        self.wait(lambda: self.flight("state") == "running", "a flight")
         self.wait(lambda: min(self.speed(0), self.speed(1)) > 0.2, "both flying again")
         self.cancel_and_reset()
 

@@ -212,6 +212,19 @@ class Flight:
         self.robots[robot].cancel_goal()
         self._watch.update(robot)
 
+    def hold(self) -> None:
+        """Stop all missions: every goal is cancelled, and no other one sent until ``release``."""
+        for number, robot in enumerate(self.robots):
+            if robot.has_navigator_goal:
+                self.cancel_goal(number)
+            robot.sequencer.hold(self.now_s)
+
+    def release(self) -> None:
+        """Resume all missions; each sends its goal again."""
+        for number, robot in enumerate(self.robots):
+            robot.sequencer.release(self.now_s)
+            self._watch.update(number)
+
     def replace_goals(self, robot: int, sequence: GoalSequence) -> None:
         """Follow other goals from now on, see ``Sequencer.replace_sequence``."""
         self.robots[robot].sequencer.replace_sequence(sequence)

@@ -18,11 +18,11 @@ from quad_nav.scenario.goal_checks import place_check
 from quad_web.view.actions import FLIGHT_ACTIONS, Answer, GoalChange, ParameterView
 from quad_web.view.goal_files import GoalEditing, GoalFiles
 
-STOPPED = "stopped by a person"
+STOPPED = "stopped by a person; Resume continues its mission"
 STARTED_AGAIN = "started again by a person"
 MAX_RATE = 1000.0
 HAS_ENDED = "the flight has ended; reset starts it again"
-_OF_ENDED = ("reset", "parameters", "goal_files", "check_goals", "save_goals", "set_rate")
+_OF_ENDED = ("start", "reset", "parameters", "goal_files", "check_goals", "save_goals", "set_rate")
 """Actions that an ended flight has."""
 
 
@@ -31,6 +31,7 @@ class FlightActions(GoalEditing):
 
     Attributes:
         is_paused: The flight stands.
+        is_stopped: The missions are stopped: the quadcopters hover.
         rate: Simulated seconds per second of wall time that are wanted; 0: as fast as it goes.
         stop_reason: Why a person ends the flight, "" to continue.
         done: What people did that changes the flight, one line each.
@@ -43,7 +44,7 @@ class FlightActions(GoalEditing):
         """Fly at a rate, in simulated seconds per second; 0 is as fast as it goes."""
         self.rate = rate
         self.version = 0
-        self.is_paused = False
+        self.is_paused = self.is_stopped = False
         self.stop_reason = ""
         self.done: List[str] = []
         self.lidars: List[bool] = []
@@ -55,6 +56,8 @@ class FlightActions(GoalEditing):
         """State of the flight for the item ``flight``."""
         if self._has_ended:
             return "ended"
+        if self.is_stopped:
+            return "stopped"
         if self.is_paused:
             return "paused"
         return "running" if self.flight.now_s > 0.0 else "starting"
@@ -68,7 +71,8 @@ class FlightActions(GoalEditing):
     def begin(self, flight: Flight) -> None:
         """Take over a flight at its start."""
         setup, self._flight = flight.setup, flight
-        self.is_paused, self._has_ended, self.stop_reason = False, False, ""
+        self.is_paused, self.is_stopped, self._has_ended = False, False, False
+        self.stop_reason = ""
         self.done = []
         self.lidars = [True] * len(flight.robots)
         paths = {robot: goals.file.path for robot, goals in enumerate(setup.robots)}
@@ -96,9 +100,15 @@ class FlightActions(GoalEditing):
     # -- time ----------------------------------------------------------------------------
 
     def start(self) -> Answer:
-        """Continue after a pause."""
+        """Continue after a pause or a stop; after its end start the flight again."""
+        if self._has_ended:
+            return self.reset()
         self.is_paused = False
-        return Answer(True, "the flight continues")
+        if not self.is_stopped:
+            return Answer(True, "the flight continues")
+        self.is_stopped = False
+        self.flight.release()
+        return self._did(None, "missions resumed")
 
     def pause(self) -> Answer:
         """Let the flight stand."""
@@ -148,9 +158,10 @@ class FlightActions(GoalEditing):
         return self._did(robot, "goal cancelled")
 
     def stop_all(self) -> Answer:
-        """End the flight."""
-        self.stop_reason, self.is_paused = STOPPED, False
-        return self._did(None, "stopped; the flight has ended")
+        """Cancel all goals and stop the missions, until they are resumed."""
+        self.is_stopped, self.is_paused = True, False
+        self.flight.hold()
+        return self._did(None, "missions stopped: every quadcopter hovers; Resume continues them")
 
     def clear_costmaps(self, robot: int) -> Answer:
         """Clear the obstacles in a robot's costmaps."""

@@ -23,7 +23,7 @@ from quad_nav.offline.flight import Flight
 from quad_nav.sim.contacts import Contact
 from quad_nav.topics.robot_topics import COLUMNS, RobotStatus
 from quad_nav.topics.tracked_obstacles import track_rows
-from quad_web.offline.actions import HAS_ENDED, FlightActions
+from quad_web.offline.actions import HAS_ENDED, STOPPED, FlightActions
 from quad_web.view import rows
 from quad_web.view.cells import cell_items
 from quad_web.view.items import (
@@ -167,14 +167,15 @@ class FlightItems:
             view.decision,
             view.limited_by,
             is_done=sequencer.done,
-            is_stopped=view.stopped_reason != "",
+            is_stopped=actions.is_stopped or view.stopped_reason != "",
             has_ended=has_ended,
             goal=None if sequencer.done else sequencer.index + 1,
             goals=len(sequencer.sequence.goals),
             said=self._columns(view),
             recoveries=(view.recoveries_done, view.recoveries),
             lidar=actions.lidars[view.robot],
-            reason=view.stopped_reason or (HAS_ENDED if has_ended else ""),
+            reason=view.stopped_reason
+            or (HAS_ENDED if has_ended else STOPPED if actions.is_stopped else ""),
         )
 
     def _columns(self, view: NavigatorView) -> Dict[str, float]:

@@ -136,9 +136,14 @@ class WebView(FlightObserver):
 
     # -- pace ----------------------------------------------------------------------------
 
+    @property
+    def _rate(self) -> float:
+        """The pace; hovering quadcopters need none but the real one."""
+        return 1.0 if self.actions.is_stopped else self.actions.rate
+
     def _keep_pace(self, flight: Flight) -> None:
         """Wait until the flight is due; one that is late does not catch up."""
-        rate = self.actions.rate
+        rate = self._rate
         if rate <= 0.0 or not self._page.is_alive:  # nobody watches any more
             self._pace = None
             return
@@ -148,7 +153,7 @@ class WebView(FlightObserver):
         due_s = self._pace[1] + (flight.now_s - self._pace[2]) / rate
         if wall_s - due_s > _MAX_LAG_S:
             self._pace = (rate, wall_s, flight.now_s)
-        while wall_s < due_s and self.actions.rate == rate and not self.actions.is_paused:
+        while wall_s < due_s and self._rate == rate and not self.actions.is_paused:
             self._page.wait(min(due_s - wall_s, PERIOD_S))
             wall_s = self._clock()
             if wall_s >= self._next_look_s:

@@ -68,15 +68,16 @@ class FlightActions(GoalEditing):
         texts = []
         if self._source.health.has_simulator or not self._source.health.is_stopped:
             texts.append(_triggered("/simulation/start"))
-            self._source.expect_paused(False)
+            self._source.expect(paused=False)
         if self._source.health.is_stopped:
             texts.append(_triggered(RESUME_SERVICE))
+            self._source.expect(stopped=False)
         return Answer(True, "; ".join(texts))
 
     def pause(self) -> Answer:
         """Stop the clock."""
         text = _triggered("/simulation/pause")
-        self._source.expect_paused(True)
+        self._source.expect(paused=True)
         return Answer(True, text)
 
     def reset(self) -> Answer:
@@ -175,9 +176,11 @@ class FlightActions(GoalEditing):
         if silent:
             names = ", ".join(f"quad{i}" for i in silent)
             return Answer(False, f"all goals cancelled, but of {names}: no navigator is connected")
-        return Answer(
-            True, "all goals cancelled, missions stopped: every quadcopter hovers; start resumes"
-        )
+        hover = "every quadcopter hovers"
+        if not outcome:
+            return Answer(True, f"all goals cancelled: {hover}; there is no mission to stop")
+        self._source.expect(stopped=True)
+        return Answer(True, f"missions stopped: {hover}; Resume continues them")
 
     def _cancel_all(self) -> None:
         for robot, publisher in enumerate(self._cancels):

@@ -156,8 +156,14 @@ class FleetHealth:
 
     @property
     def is_stopped(self) -> bool:
-        """True if a person has stopped the mission."""
+        """True if a person has stopped a mission."""
         return any(self.progress(i).is_stopped for i in range(self._robots))
+
+    @property
+    def are_all_stopped(self) -> bool:
+        """True if a person has stopped all missions that are not done."""
+        missions = [self.progress(i) for i in range(self._robots)]
+        return self.is_stopped and all(one.is_stopped or one.is_done for one in missions)
 
     # -- the simulator -------------------------------------------------------------------
 

@@ -29,7 +29,7 @@ from quad_web.view.state import FleetState, Item, Wanted, robots_by_layer
 PERIOD_S = 0.05  # wall time, as the others; the stream sends half as often
 RESTING_S = 0.2  # without clients
 _LAYERS_EVERY, _ROWS_EVERY, _TOPICS_EVERY, _HEALTH_EVERY = 2, 5, 10, 20  # periods
-_EXPECTED_S = 1.5  # time until the simulator's diagnostics tell of a pause or start
+_EXPECTED_S = 1.5  # time until the diagnostics tell of a pause, a stop or a start
 _SETTLES_S = 2.0  # time until a navigator tells of a goal that was sent
 _JUMP_S = 0.5
 
@@ -62,7 +62,7 @@ class FlightSource:
         self._seen: Dict[str, Any] = {}  # data of items that seldom change, by key
         self._passing: FrozenSet[str] = frozenset()  # keys of items that disappear
         self._sent: Dict[int, Tuple[float, Pose2D]] = {}  # goals that people have sent
-        self._expected: Tuple[float, Optional[bool]] = (0.0, None)  # until when, is paused
+        self._expected: Dict[str, Tuple[float, bool]] = {}  # until when, whether it is so
         self._wanted: Sequence[Wanted] = ()
         self._count, self._resets, self._stamp_s, self._version = 0, 0, 0.0, -1
 
@@ -70,9 +70,15 @@ class FlightSource:
         """Show the flight, in a thread."""
         threading.Thread(target=self._run, name="source", daemon=True).start()
 
-    def expect_paused(self, is_paused: bool) -> None:
-        """Show that the simulation was paused or started before the simulator tells so."""
-        self._expected = time.monotonic() + _EXPECTED_S, is_paused
+    def expect(self, **states: bool) -> None:
+        """Show that the flight is ``paused`` or ``stopped``, or not, before the nodes tell so."""
+        until_s = time.monotonic() + _EXPECTED_S
+        self._expected.update({name: (until_s, is_so) for name, is_so in states.items()})
+
+    def _is(self, name: str, told: bool) -> bool:
+        """Return whether the flight is in a state; ``told`` is what the nodes say."""
+        until_s, is_so = self._expected.get(name, (0.0, told))
+        return told if time.monotonic() > until_s else is_so
 
     def show_goal(self, robot: int, goal: Optional[Pose2D]) -> None:
         """Show a goal that a person has sent; None removes it."""
@@ -237,7 +243,7 @@ class FlightSource:
         if lost:
             self.reports.forget_navigator(robot)
         elif progress.is_stopped and not reason:
-            reason = "stopped by a person; start resumes its mission"
+            reason = "stopped by a person; Resume continues its mission"
         right = self.reports.right_of_way(robot)
         return rows.RobotNow(
             navigator or "idle",
@@ -266,12 +272,12 @@ class FlightSource:
         rate, wanted_rate = self.health.rates
         stamp_s = self.bodies.stamp_s
         silent_s = float(self.bodies.ages_s().min(initial=math.inf))
-        until_s, is_paused = self._expected
-        if is_paused is None or time.monotonic() > until_s:
-            is_paused = self.health.is_paused
+        is_paused = self._is("paused", self.health.is_paused)
         state, reason = "running", ""
         if silent_s > LOST_AFTER_S:
             state, reason = "waiting", "no poses of any quadcopter"
+        elif self._is("stopped", self.health.are_all_stopped):
+            state = "stopped"
         elif is_paused:
             state = "ready" if stamp_s <= START_S + _JUMP_S else "paused"
         if wanted_rate is not None and wanted_rate >= FASTEST_RATE:

@@ -239,7 +239,7 @@ def flight_item(
     Args:
         source: "preview", "ros", "offline" or "replay".
         title: Name of the scene, mission or file.
-        state: "ready", "starting", "running", "paused", "ended" or "waiting" (for data).
+        state: "ready", "starting", "running", "paused", "stopped", "ended" or "waiting" (for data).
         time_s: Time on the flight's clock.
         rate: Simulated seconds per second that are achieved, None if unknown.
         wanted_rate: Those that are asked for; 0 is as fast as it goes, None if unknown.
