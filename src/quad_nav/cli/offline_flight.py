@@ -13,7 +13,7 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Protocol, Seque
 
 from quad_nav.cli import EXIT_INTERRUPTED, add_ons
 from quad_nav.cli.options import echo, echo_lines, exit_on_faults, parameter, show_warnings
-from quad_nav.cli.outputs import Outputs
+from quad_nav.cli.outputs import HTML, Outputs
 from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar, compile_kernels
 from quad_nav.errors import PluginError
@@ -70,6 +70,7 @@ def fly_mission(
             {"--record": record, "--animate": animate},
             {"--pictures": pictures},
             quiet=quiet,
+            suffixes={"--report": HTML},
         )
         options = _options(**given)
         setup = read_setup(options)
@@ -94,11 +95,8 @@ def fly_mission(
 
 def _compile(setup: FlightSetup, quiet: bool) -> None:
     """Compile the kernels; a plugin's mistake ends the flight later."""
-    try:
-        with contextlib.suppress(PluginError):
-            compile_kernels(setup.configurations, quiet)
-    except KeyboardInterrupt:
-        sys.exit(EXIT_INTERRUPTED)
+    with contextlib.suppress(PluginError):
+        compile_kernels(setup.configurations, quiet)
 
 
 def _page(options: Mapping[str, Any]) -> FlightPage:
