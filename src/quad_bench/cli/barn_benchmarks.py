@@ -53,7 +53,7 @@ def _fly(
     quiet: bool,
     **given: Any,
 ) -> None:
-    with exit_on_faults():
+    with exit_on_faults("benchmark not started"):
         outputs = Outputs({"--json": json_path, "--csv": csv_path}, quiet=quiet)
         setup = read(_options(**given))
         benchmark: Benchmark[Any] = Benchmark(

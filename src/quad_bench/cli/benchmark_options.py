@@ -6,7 +6,7 @@ from typing import Any, Callable, TypeVar
 
 import click
 
-from quad_nav.cli.options import A_FILE, COUNT, OUTPUT, POSITIVE
+from quad_nav.cli.options import A_FILE, COUNT, OUTPUT, POSITIVE, Integer
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -30,7 +30,7 @@ _FLIGHTS = (
     ),
     click.option(
         "--seed",
-        type=click.IntRange(min=0),
+        type=Integer(min=0),
         default=0,
         show_default=True,
         help="Seed of what is random; equal seeds give equal results.",

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from quad_bench.cli.benchmark_options import body_radius_option, flight_options
-from quad_nav.cli.options import A_FILE, AMOUNT, POSITIVE
+from quad_nav.cli.options import A_FILE, AMOUNT, POSITIVE, Integer
 
 # Those of quad_bench.circle.setup, and of the body; importing them would load the engine.
 METHODS = ("quad", "orca", "orca-points")
@@ -17,7 +17,7 @@ BODY_RADIUS_M = 0.30
 @click.command()
 @click.option(
     "--robots",
-    type=click.IntRange(min=2),
+    type=Integer(min=2),
     multiple=True,
     default=(8,),
     show_default=True,

@@ -26,7 +26,7 @@ def fly_circle(
     **given: Any,
 ) -> None:
     """Fly with the options of ``quad circle`` and exit with its status."""
-    with exit_on_faults():
+    with exit_on_faults("benchmark not started"):
         texts = {"--json": json_path, "--csv": csv_path}
         outputs = Outputs(texts, {"--picture": _checked(picture)}, quiet=quiet)
         options = _options(**given)

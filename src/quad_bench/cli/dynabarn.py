@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from quad_bench.cli.benchmark_options import body_radius_option, flight_options, world_options
+from quad_nav.cli.options import AMOUNT
 
 # Those of quad_nav.sim.motion and quad_bench.barn.dynamic; importing them would load the engine.
 INTERPOLATIONS = ("linear", "spline")
@@ -18,7 +19,7 @@ PUBLISHED_SPEED_MPS = 0.5
 @click.option(
     "--max-vel-x",
     "max_vel_x_mps",
-    type=click.FloatRange(min=0.0),
+    type=AMOUNT,
     default=PUBLISHED_SPEED_MPS,
     show_default=True,
     metavar="M/S",

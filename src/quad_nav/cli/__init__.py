@@ -27,19 +27,26 @@ EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 COMMANDS: Dict[str, Tuple[str, str]] = {
-    "barn": ("quad_bench", "Fly through the worlds of the BARN benchmark without ROS."),
-    "dynabarn": ("quad_bench", "Fly among the moving obstacles of DynaBARN without ROS."),
-    "check": ("quad_nav", "Check move_base's YAML without flying."),
-    "circle": ("quad_bench", "Let robots on a circle swap sides, beside ORCA."),
     "fly": ("quad_nav", "Fly a mission without ROS, as fast as the machine allows."),
     "goals": ("quad_nav", "Convert other people's lists of waypoints to goal files."),
     "preview": ("quad_nav", "Show a mission before anything flies, and edit its goals."),
     "replay": ("quad_web", "Play a recorded flight on a page in the browser."),
     "report": ("quad_nav", "Write a report of a recorded flight, or compare several."),
+    "check": ("quad_nav", "Check move_base's YAML without flying."),
     "sweep": ("quad_tune", "Compare flights over the values of some parameters."),
     "tune": ("quad_tune", "Search for parameters that fly better, without ROS."),
+    "barn": ("quad_bench", "Fly through the worlds of the BARN benchmark without ROS."),
+    "circle": ("quad_bench", "Let robots on a circle swap sides, beside ORCA."),
+    "dynabarn": ("quad_bench", "Fly among the moving obstacles of DynaBARN without ROS."),
 }
 """Name -> its package and its line in the list of commands. The module is `package.cli.name`."""
+_HEADINGS = {
+    "fly": "Mission",
+    "replay": "Recorded flights",
+    "check": "Parameters",
+    "barn": "Benchmarks",
+}
+"""First command of each group -> heading of the group."""
 
 
 @contextmanager
@@ -63,9 +70,16 @@ class Commands(click.Group):
             return super().make_context(*args, **kwargs)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Parse the arguments behind the command's name, and run the command."""
-        with _escaped_messages():
-            return super().invoke(ctx)
+        """Parse the arguments behind the command's name, and run the command.
+
+        Ctrl-C during an import or a set-up, which the command does not handle, ends with 130.
+        """
+        try:
+            with _escaped_messages():
+                return super().invoke(ctx)
+        except KeyboardInterrupt:
+            click.echo("interrupted", err=True)
+            ctx.exit(EXIT_INTERRUPTED)
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         """Run the command line; end with a message if standard output is full.
@@ -103,8 +117,14 @@ class Commands(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands without importing their modules."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
+        groups: Dict[str, List[Tuple[str, str]]] = {}
+        heading, width = "", max(map(len, COMMANDS))
+        for name, (_, line) in COMMANDS.items():
+            heading = _HEADINGS.get(name, heading)
+            groups.setdefault(heading, []).append((f"{name:{width}}", line))
+        for heading, rows in groups.items():
+            with formatter.section(heading):
+                formatter.write_dl(rows)
 
     def list_commands(self, ctx: click.Context) -> List[str]:
         """Return the names of all commands."""
@@ -131,7 +151,11 @@ def _discard_output() -> None:
     os.close(null)
 
 
-@click.command(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.command(
+    cls=Commands,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="\b\nExample:\n  quad fly --report flight.html\n\nMore: README.md, docs/first_hour.md",
+)
 @click.version_option(quad_nav.__version__, prog_name="quad")
 def main() -> None:
     """Fly quadcopters with the ROS navigation stack."""

@@ -10,7 +10,7 @@ from typing import List, Optional, Sequence, Tuple
 import click
 
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_SUCCESS
-from quad_nav.cli.options import echo, echo_lines
+from quad_nav.cli.options import Integer, echo, echo_lines
 from quad_nav.config.check import Report, check_files, check_source, counts, report_text
 from quad_nav.config.files import COSTMAPS
 from quad_nav.config.launch_file import is_launch_file
@@ -25,7 +25,7 @@ _NARROWEST, _WIDEST = 80, 100  # columns of tables
 @click.argument("paths", nargs=-1, required=True, metavar="SOURCE | [COSTMAP=]FILE...")
 @click.option(
     "--robot",
-    type=click.IntRange(min=0),
+    type=Integer(min=0),
     metavar="N",
     help="Check the configuration of robot N: $(arg i) is N, and files with this number replace"
     " those without. Without the option every robot with its own files is checked.",
@@ -68,11 +68,13 @@ def _is_source(word: str) -> bool:
         return is_launch_file(path)
     if path.is_dir():
         return True
+    if word.partition("=")[0] in COSTMAPS:
+        return False
     try:
         split_source(word)
-    except InputError:
-        return False
-    return word.partition("=")[0] not in COSTMAPS
+    except InputError:  # a file that does not exist, or a misspelled name
+        return not path.suffix and path.name == word
+    return True
 
 
 def _choices(source: str, reports: Sequence[Report]) -> List[str]:
@@ -90,7 +92,8 @@ def _show(
 ) -> None:
     terminal = shutil.get_terminal_size((_WIDEST, 24)).columns
     width = max(_NARROWEST, min(terminal, _WIDEST))
-    echo_lines("\n\n".join(report_text(report, width) for report in reports))
+    if reports:
+        echo_lines("\n\n".join(report_text(report, width) for report in reports))
     if unused:
         echo("")
         echo("Not checked, no move_base parameters in: " + ", ".join(map(str, unused)))

@@ -7,14 +7,37 @@ from typing import Any
 
 import click
 
-from quad_nav.cli.options import A_FILE, A_FOLDER, A_PATH, AMOUNT, OUTPUT, POSITIVE, web_options
+from quad_nav.cli.options import (
+    A_FILE,
+    A_FOLDER,
+    A_PATH,
+    AMOUNT,
+    CONFIGURATIONS,
+    COUNT,
+    OUTPUT,
+    POSITIVE,
+    GroupedCommand,
+    Integer,
+    web_options,
+)
 
 # Those of quad_nav.sim.simulation and .flight; importing them would load the engine.
 LIDAR_CASTERS = ("kernel", "bullet")
 AIRFRAMES = ("default", "arducopter")
 
 
-@click.command()
+@click.command(
+    cls=GroupedCommand,
+    headings={
+        "scene": "Mission",
+        "airframe": "Robots",
+        "lidar": "Simulation",
+        "json_path": "Output",
+        "web": "Page in the browser",
+    },
+    epilog="\b\nExample:\n  quad fly --scene office.yaml --goals my_goals/ --report flight.html"
+    "\n\nMore: docs/offline.md",
+)
 @click.option(
     "--scene",
     type=A_FILE,
@@ -31,7 +54,7 @@ AIRFRAMES = ("default", "arducopter")
     default="default",
     show_default=True,
     metavar="NAME|FOLDER",
-    help="Configuration of move_base: 'default', 'tutorial' or a folder of YAML files.",
+    help=f"Configuration of move_base: {CONFIGURATIONS}.",
 )
 @click.option(
     "--set",
@@ -42,7 +65,7 @@ AIRFRAMES = ("default", "arducopter")
 )
 @click.option(
     "--robots",
-    type=click.IntRange(min=1),
+    type=COUNT,
     metavar="N",
     help="Number of quadcopters. More than two without --scene and --goals fly a random mission."
     " [default: one for each goal file]",
@@ -57,7 +80,7 @@ AIRFRAMES = ("default", "arducopter")
 )
 @click.option(
     "--seed",
-    type=click.IntRange(0, 2**63 - 1),  # scenario.rules.MAX_SEED, whose module loads numpy
+    type=Integer(0, 2**63 - 1),  # scenario.rules.MAX_SEED, whose module loads numpy
     metavar="N",
     default=0,
     show_default=True,
@@ -79,6 +102,19 @@ AIRFRAMES = ("default", "arducopter")
     help="End the flight after this simulated time.",
 )
 @click.option(
+    "--airframe",
+    type=click.Choice(AIRFRAMES),
+    default="default",
+    show_default=True,
+    help="Bodies that follow commands at once, or as slowly as with ArduCopter.",
+)
+@click.option(
+    "--odom-drift",
+    default="",
+    metavar="NAME=VALUE,...",
+    help="Errors of the odometry, such as per_m=0.05,per_rad=0.05. [default: none]",
+)
+@click.option(
     "--scan-range",
     type=POSITIVE,
     default=2 * math.pi,
@@ -86,7 +122,7 @@ AIRFRAMES = ("default", "arducopter")
     help="Field of view of the LIDARs. [default: 2 pi]",
 )
 @click.option(
-    "--beams", type=click.IntRange(min=2), default=512, show_default=True, help="Beams per scan."
+    "--beams", type=Integer(min=2), default=512, show_default=True, help="Beams per scan."
 )
 @click.option(
     "--lidar-rate",
@@ -105,12 +141,6 @@ AIRFRAMES = ("default", "arducopter")
     help="Standard deviation of the LIDARs' range noise.",
 )
 @click.option(
-    "--odom-drift",
-    default="",
-    metavar="NAME=VALUE,...",
-    help="Errors of the odometry, such as per_m=0.05,per_rad=0.05. [default: none]",
-)
-@click.option(
     "--lidar",
     type=click.Choice(LIDAR_CASTERS),
     default="kernel",
@@ -118,15 +148,8 @@ AIRFRAMES = ("default", "arducopter")
     help="Cast the beams with the numba kernel or with the physics engine.",
 )
 @click.option(
-    "--airframe",
-    type=click.Choice(AIRFRAMES),
-    default="default",
-    show_default=True,
-    help="Bodies that follow commands at once, or as slowly as with ArduCopter.",
-)
-@click.option(
     "--processes",
-    type=click.IntRange(min=1),
+    type=COUNT,
     metavar="N",
     help="Processes that share the navigators; the flight does not depend on it. [default: one"
     " for each core, at most one per quadcopter]",
@@ -137,28 +160,6 @@ AIRFRAMES = ("default", "arducopter")
     type=OUTPUT,
     metavar="FILE",
     help="Write the summary as JSON; - is standard output.",
-)
-@click.option(
-    "--record",
-    type=A_FILE,
-    metavar="FILE.bag",
-    help="Record the ROS topics, for rosbag play and RViz.",
-)
-@click.option(
-    "--web",
-    is_flag=True,
-    help="Show the flight on a page in the browser, where people can also steer it. It begins when"
-    " a page is open; Ctrl-C closes the page.",
-)
-@web_options
-@click.option(
-    "--rate",
-    type=AMOUNT,
-    default=1.0,
-    show_default=True,
-    metavar="R",
-    help="Simulated seconds per second with --web, until somebody sets another one on the page; 0"
-    " is as fast as it goes.",
 )
 @click.option(
     "--report",
@@ -178,7 +179,29 @@ AIRFRAMES = ("default", "arducopter")
     metavar="FILE",
     help="Write an animation: .gif, or .mp4 if ffmpeg is installed.",
 )
+@click.option(
+    "--record",
+    type=A_FILE,
+    metavar="FILE.bag",
+    help="Record the ROS topics, for rosbag play and RViz.",
+)
 @click.option("--quiet", "-q", is_flag=True, help="Show no progress bar and no table.")
+@click.option(
+    "--web",
+    is_flag=True,
+    help="Show the flight on a page in the browser, where people can also steer it. It begins when"
+    " a page is open; Ctrl-C closes the page.",
+)
+@web_options
+@click.option(
+    "--rate",
+    type=AMOUNT,
+    default=1.0,
+    show_default=True,
+    metavar="R",
+    help="Simulated seconds per second with --web, until somebody sets another one on the page; 0"
+    " is as fast as it goes.",
+)
 def fly(**given: Any) -> None:
     """Fly a mission without ROS, as fast as the machine allows.
 

@@ -11,7 +11,6 @@ from quad_nav.cli import EXIT_BAD_INPUT, EXIT_SUCCESS, add_ons
 from quad_nav.cli.offline_flight import mission_options
 from quad_nav.cli.options import echo, echo_lines, exit_on_faults, show_warnings
 from quad_nav.cli.outputs import Outputs
-from quad_nav.errors import InputError
 from quad_nav.report.preview_page import page_data, preview_page
 from quad_nav.report.preview_picture import SUFFIXES, write_picture
 from quad_nav.scenario.preview import MissionPreview, RobotPreview
@@ -23,10 +22,8 @@ def show_mission(output: Optional[Path], open_it: bool, edit: bool, **given: Any
     """Show a mission with the options of ``quad preview`` and exit with its status."""
     if output is None and not edit:
         output = _DEFAULT_OUTPUT
-    with exit_on_faults():
-        outputs = Outputs({}, {"--output": output})
-        if output is not None and output.suffix.lower() not in SUFFIXES:
-            raise InputError([f"--output: {output}: expected a name in {', '.join(SUFFIXES)}"])
+    with exit_on_faults("preview not made"):
+        outputs = Outputs({}, {"--output": output}, suffixes={"--output": SUFFIXES})
         options = mission_options(**given)
         preview = MissionPreview(options)
         heading = title(preview, options.config)
@@ -43,7 +40,7 @@ def show_mission(output: Optional[Path], open_it: bool, edit: bool, **given: Any
             if open_it and page is None:
                 _open(output.resolve().as_uri())
     if page is not None:
-        with exit_on_faults():
+        with exit_on_faults("preview not made"):
             page.serve(open_it)
         sys.exit(EXIT_SUCCESS)
     sys.exit(outputs.exit_status(EXIT_BAD_INPUT if preview.problems else EXIT_SUCCESS))

@@ -15,7 +15,7 @@ import yaml
 
 from quad_nav.cli import EXIT_INTERRUPTED, add_ons
 from quad_nav.cli.options import echo, echo_lines, exit_on_faults, parameter, show_warnings
-from quad_nav.cli.outputs import Outputs
+from quad_nav.cli.outputs import HTML, Outputs
 from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar, clock, compile_kernels
 from quad_nav.errors import InputError, PluginError
@@ -74,6 +74,7 @@ def fly_mission(
             {"--record": record, "--animate": animate},
             {"--pictures": pictures},
             quiet=quiet,
+            suffixes={"--report": HTML},
         )
         options = _options(**given)
         with clock("reading the mission", quiet):
@@ -105,11 +106,8 @@ def _show_warnings(setup: FlightSetup) -> None:
 
 def _compile(setup: FlightSetup, quiet: bool) -> None:
     """Compile the kernels; a plugin's mistake ends the flight later."""
-    try:
-        with contextlib.suppress(PluginError):
-            compile_kernels(setup.configurations, quiet)
-    except KeyboardInterrupt:
-        sys.exit(EXIT_INTERRUPTED)
+    with contextlib.suppress(PluginError):
+        compile_kernels(setup.configurations, quiet)
 
 
 def _page(options: Mapping[str, Any]) -> FlightPage:

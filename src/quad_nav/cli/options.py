@@ -6,7 +6,7 @@ import signal
 import sys
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Callable, Iterable, Iterator, Tuple
+from typing import Any, Callable, Dict, Iterable, Iterator, List, Mapping, Tuple
 
 import click
 import yaml
@@ -16,15 +16,57 @@ from quad_nav.errors import InputError, QuadError, printable
 from quad_nav.files import plain_yaml
 from quad_nav.files.document import yaml_fault
 
+
+class Integer(click.IntRange):
+    """A range whose messages say "integer"; click's say "integer range"."""
+
+    name = "integer"
+
+
+class Number(click.FloatRange):
+    """A range whose messages say "number"; click's say "float range"."""
+
+    name = "number"
+
+
 A_FILE = click.Path(dir_okay=False, path_type=Path)
 A_PATH = click.Path(path_type=Path)
 A_FOLDER = click.Path(file_okay=False, path_type=Path)
-POSITIVE = click.FloatRange(min=0.0, min_open=True)
-AMOUNT = click.FloatRange(min=0.0)
-COUNT = click.IntRange(min=1)
+POSITIVE = Number(min=0.0, min_open=True)
+AMOUNT = Number(min=0.0)
+COUNT = Integer(min=1)
 OUTPUT = click.Path(dir_okay=False, allow_dash=True, path_type=Path)
 """Type of an option whose text ``-`` sends to standard output."""
 LOOPBACK = "127.0.0.1"
+CONFIGURATIONS = (
+    "'barn', 'default', 'moving', 'people', 'tutorial', a folder, a YAML or launch file"
+)
+"""What ``--config`` takes; listing the shipped folder would slow every start of ``quad``."""
+
+
+class GroupedCommand(click.Command):
+    """Lists its options in groups.
+
+    Args:
+        headings: Name of the first parameter of each group -> heading of the group.
+    """
+
+    def __init__(self, *args: Any, headings: Mapping[str, str], **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._headings = headings
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write a section for each group."""
+        groups: Dict[str, List[Tuple[str, str]]] = {}
+        heading = "Options"
+        for one in self.get_params(ctx):
+            heading = self._headings.get(one.name or "", heading)
+            record = one.get_help_record(ctx)
+            if record is not None:
+                groups.setdefault(heading, []).append(record)
+        for heading, rows in groups.items():
+            with formatter.section(heading):
+                formatter.write_dl(rows)
 
 
 def web_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -43,7 +85,7 @@ def web_options(command: Callable[..., Any]) -> Callable[..., Any]:
         ),
         click.option(
             "--port",
-            type=click.IntRange(0, 65535),
+            type=Integer(0, 65535),
             default=0,
             metavar="N",
             help="Serve the page on this port. [default: the first free one from 8080 on]",
@@ -86,12 +128,16 @@ def echo_lines(text: str, err: bool = False) -> None:
 
 
 @contextmanager
-def exit_on_faults() -> Iterator[None]:
-    """Exit the command with the status for the error, after printing a line per fault."""
+def exit_on_faults(refused: str = "flight not started") -> Iterator[None]:
+    """Exit the command with the status for the error, after printing a line per fault.
+
+    Args:
+        refused: What invalid input prevents, for the first line.
+    """
     try:
         yield
     except InputError as error:
-        echo_lines("flight not started, invalid input:\n  " + "\n  ".join(error.problems), err=True)
+        echo_lines(f"{refused}, invalid input:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)
     except QuadError as error:
         echo_lines(str(error), err=True)

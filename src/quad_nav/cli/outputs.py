@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Callable, Iterator, List, Mapping, Optional
+from types import MappingProxyType
+from typing import Callable, Iterator, List, Mapping, Optional, Sequence
 
 from quad_nav.cli import EXIT_FAILURE
 from quad_nav.cli.options import echo, echo_lines
@@ -12,6 +13,8 @@ from quad_nav.errors import InputError
 from quad_nav.files.output import folder_faults, output_faults, reason, write_text
 
 STDOUT = Path("-")
+HTML = (".html", ".htm")
+"""Suffixes of a report's name."""
 _KINDS = {"--output": "report", "--animate": "animation"}
 
 _Paths = Mapping[str, Optional[Path]]
@@ -26,12 +29,14 @@ class Outputs:
         files: Files that are read back while they are written.
         folders: Folders for several files.
         quiet: Do not say which files were written.
+        suffixes: Those that the name of an option's file may have; devices and pipes have none.
 
     Attributes:
         has_failed: True after a file could not be written.
 
     Raises:
-        InputError: A file or folder cannot be written; lists all of them.
+        InputError: A file or folder cannot be written, or its name suits another kind of file;
+            lists all of them.
     """
 
     def __init__(
@@ -40,6 +45,7 @@ class Outputs:
         files: _Paths = _NONE,
         folders: _Paths = _NONE,
         quiet: bool = False,
+        suffixes: Mapping[str, Sequence[str]] = MappingProxyType({}),
     ) -> None:
         self._paths = {**texts, **files, **folders}
         self._quiet = quiet
@@ -52,6 +58,11 @@ class Outputs:
                 faults += folder_faults(path, option)
             else:
                 faults += output_faults(path, option, any_kind=option in texts)
+                known = suffixes.get(option, ())
+                is_file = path.is_file() or not path.exists()
+                if known and is_file and path.suffix.lower() not in known:
+                    names = " or ".join(known)
+                    faults.append(f"{option}: {path}: expected a name that ends in {names}")
         if faults:
             raise InputError(faults)
 

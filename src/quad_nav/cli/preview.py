@@ -8,13 +8,18 @@ import click
 
 from quad_nav.cli import add_ons
 from quad_nav.cli.fly import fly
-from quad_nav.cli.options import A_FILE
+from quad_nav.cli.options import A_FILE, GroupedCommand
 
 _SHARED = ("scene", "goals", "config", "parameters", "robots", "size_m", "seed")
 """Options of ``quad fly`` that set what is flown."""
 
 
-@click.command()
+@click.command(
+    cls=GroupedCommand,
+    headings={"scene": "Mission", "output": "Output"},
+    epilog="\b\nExample:\n  quad preview --scene office.yaml --goals my_goals/ -o mission.html"
+    "\n\nMore: docs/preview.md",
+)
 @click.option(
     "--output",
     "-o",

@@ -14,7 +14,7 @@ from rich.progress import track
 
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_SUCCESS, add_ons
 from quad_nav.cli.options import echo, echo_lines
-from quad_nav.cli.outputs import Outputs
+from quad_nav.cli.outputs import HTML, Outputs
 from quad_nav.errors import InputError
 from quad_nav.recording.trace import FlightTrace
 
@@ -66,7 +66,12 @@ def report(
     from quad_nav.report.flight_page import flight_page
 
     try:
-        outputs = Outputs({"--output": output}, {"--animate": animate}, {"--pictures": pictures})
+        outputs = Outputs(
+            {"--output": output},
+            {"--animate": animate},
+            {"--pictures": pictures},
+            suffixes={"--output": HTML},
+        )
         faults = animation.animation_faults(animate, len(flights)) if animate is not None else []
         if len(flights) == 1:
             (trace,) = _read(flights, lambda trace: trace, faults)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import dataclass, field
 from typing import Container, Iterable, List, Optional, Sequence, Tuple
 
@@ -41,7 +42,7 @@ def table(summary: MissionSummary, width: int = DEFAULT_WIDTH) -> str:
     parts = [_goal_table(summary.robots, width), _robot_table(summary, width)]
     if summary.contacts:
         parts.append(_contact_table(summary.contacts, width))
-    parts.append(_verdict(summary))
+    parts.append(_verdict(summary, width))
     return "\n\n".join(parts)
 
 
@@ -192,7 +193,7 @@ def _fit(columns: Sequence[_Column], width: int) -> Tuple[List[_Column], List[_C
     return shown, [column for column in columns if column not in shown]
 
 
-def _verdict(summary: MissionSummary) -> str:
+def _verdict(summary: MissionSummary, width: int) -> str:
     legs = [leg for robot in summary.robots for leg in robot.legs]
     reached = sum(leg.reached for leg in legs)
     factor = summary.real_time_factor
@@ -207,11 +208,12 @@ def _verdict(summary: MissionSummary) -> str:
     if summary.interventions:
         reason += "\nPeople steered the mission:"
         reason += "".join(f"\n  {printable(line)}" for line in summary.interventions)
-    return (
+    verdict = (
         f"Mission {'succeeded' if summary.success else 'FAILED'}: {reached} of {len(legs)} goals "
         f"reached{contacts} in {summary.sim_time_s:.1f} s "
-        f"(wall {summary.wall_time_s:.1f} s{speed}).{reason}"
+        f"(wall {summary.wall_time_s:.1f} s{speed})."
     )
+    return textwrap.fill(verdict, width, break_on_hyphens=False) + reason
 
 
 def _number(value: Optional[float], decimals: int) -> str:

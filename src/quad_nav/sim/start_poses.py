@@ -27,7 +27,8 @@ def start_poses(
     """
     if not 1 <= n_robots <= len(scene.starts):
         known = f"1 to {len(scene.starts)}, the start poses of scene {scene.name}"
-        raise InputError([f"robots: {n_robots}, expected {known}"])
+        more = f"{known}; a further line in its `starts` adds a robot"
+        raise InputError([f"robots: {n_robots}, expected {more}"])
     random = np.random.default_rng([seed, 0])
     starts: List[Pose2D] = []
     for robot in range(n_robots):

@@ -7,7 +7,15 @@ from typing import Any, Callable, TypeVar
 
 import click
 
-from quad_nav.cli.options import A_FILE, A_FOLDER, AMOUNT, COUNT, POSITIVE
+from quad_nav.cli.options import (
+    A_FILE,
+    A_FOLDER,
+    AMOUNT,
+    CONFIGURATIONS,
+    COUNT,
+    POSITIVE,
+    Integer,
+)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -39,8 +47,8 @@ _FLOWN = (
     click.option(
         "--config",
         metavar="NAME|FOLDER",
-        help="Base configuration: move_base's parameters. [default: 'default', with --worlds"
-        " 'barn']",
+        help=f"Base configuration of move_base: {CONFIGURATIONS}. [default: 'default', with"
+        " --worlds 'barn']",
     ),
     click.option(
         "--set",
@@ -89,7 +97,7 @@ _FLOWN = (
     ),
     click.option(
         "--beams",
-        type=click.IntRange(min=2),
+        type=Integer(min=2),
         default=512,
         show_default=True,
         help="Number of beams of a scan.",
@@ -121,7 +129,7 @@ _FLOWN = (
     ),
     click.option(
         "--seed",
-        type=click.IntRange(min=0),
+        type=Integer(min=0),
         default=0,
         show_default=True,
         help="Random seed; equal seeds give equal results.",

@@ -16,7 +16,7 @@ from quad_nav.cli.options import (
     exit_on_faults,
     show_warnings,
 )
-from quad_nav.cli.outputs import Outputs
+from quad_nav.cli.outputs import HTML, Outputs
 from quad_nav.cli.progress import processes_text
 from quad_nav.errors import InputError
 from quad_nav.files import plain_yaml
@@ -45,11 +45,12 @@ def fly_sweep(
     **given: Any,
 ) -> None:
     """Fly with the options of ``quad sweep`` and exit with its status."""
-    with exit_on_faults():
+    with exit_on_faults("sweep not started"):
         outputs = Outputs(
             {"--json": json_path, "--csv": csv_path, "--report": report},
             folders={"--pictures": pictures},
             quiet=quiet,
+            suffixes={"--report": HTML},
         )
         setup, rows, is_stored = _fly(quiet=quiet, **given)
     if not quiet:

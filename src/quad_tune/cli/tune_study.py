@@ -29,7 +29,7 @@ def run_study(
     **given: Any,
 ) -> None:
     """Search with the options of ``quad tune`` and exit with its status."""
-    with exit_on_faults():
+    with exit_on_faults("study not started"):
         outputs = Outputs({}, folders={"--output": output, "--pictures": pictures})
         setup = read_tune_setup(_options(output, **given))
         pool = workers_of(workers, ray_address)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ from click.testing import CliRunner
 
 from quad_nav.cli import COMMANDS, main
 from quad_nav.cli.fly import LIDAR_CASTERS, MAX_DRIFT
+from quad_nav.files.shipped import config_names
 from quad_nav.sim import odometry, simulation_params
 
 SOURCES = Path(__file__).resolve().parents[3] / "src"
@@ -51,6 +53,48 @@ def test_every_command_is_listed_with_its_own_text():
             continue
         command = main.get_command(click.Context(main), name)
         assert command is not None and command.name == name
+
+
+def test_help_has_groups_an_example_and_every_configuration():
+    text = CliRunner().invoke(main, ["fly", "--help"], env={"COLUMNS": "80"}).output
+    assert re.findall(r"^(\w[\w ]*):$", text, re.MULTILINE) == [
+        "Mission",
+        "Robots",
+        "Simulation",
+        "Output",
+        "Page in the browser",
+    ]
+    assert "\n    quad fly --scene office.yaml" in text and "docs/offline.md" in text
+    assert all(f"'{name}'" in text for name in config_names())
+
+
+@pytest.mark.parametrize(
+    "words, fault",
+    [
+        ("fly --robots abc", "'abc' is not a valid integer."),
+        ("circle --radius abc", "'abc' is not a valid number."),
+        ("fly --report x.txt", "flight not started, invalid input:\n  --report: x.txt: expected a"),
+        ("report nope.bag -o x.txt", "--output: x.txt: expected a name that ends in .html or .htm"),
+        ("sweep", "sweep not started, invalid input:\n  expected --over"),
+        ("preview -o x.txt", "preview not made, invalid input:\n  --output: x.txt: expected a"),
+        ("check defalt", "config: defalt: expected a folder, a YAML file, a launch file, or the"),
+        ("check defalt", "did you mean default?"),
+        ("check nope", "there are barn, default, moving, people, tutorial"),
+        ("check nope.yaml", "cannot be read: No such file or directory"),
+    ],
+)
+def test_what_is_refused_and_why(words, fault):
+    done = CliRunner().invoke(main, words.split())
+    assert done.exit_code == 2 and fault in done.output
+
+
+def test_ctrl_c_before_the_flight(monkeypatch):
+    def interrupt(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("quad_nav.cli.offline_flight.read_setup", interrupt)
+    done = CliRunner().invoke(main, ["fly"])
+    assert (done.exit_code, done.output) == (130, "interrupted\n")
 
 
 def test_constants_of_the_options_are_those_of_the_engine():

@@ -163,6 +163,7 @@ def test_the_table_has_figures_and_reasons():
         "Mission FAILED: 1 of 3 goals reached, 1 contact in 20.0 s "
         "(wall 10.0 s, real-time factor 2.00)."
     )
+    assert table(SUMMARY, 80).endswith("20.0 s (wall 10.0 s,\nreal-time factor 2.00).")
 
 
 def test_goals_with_a_yaw_have_its_error():

@@ -50,7 +50,11 @@ def test_every_fault_is_listed():
 @pytest.mark.parametrize(
     "parameters, problem",
     [
-        ({"robots": 9}, "simulator: robots: 9, expected 1 to 8, the start poses of scene arena"),
+        (
+            {"robots": 9},
+            "simulator: robots: 9, expected 1 to 8, the start poses of scene arena; a further line"
+            " in its `starts` adds a robot",
+        ),
         ({"robots": True}, "simulator: robots: is True; expected a whole number, 1 to 100"),
         ({"lidar": "gazebo"}, "simulator: lidar: is 'gazebo'; expected kernel or bullet"),
         (
