@@ -115,6 +115,13 @@ AIRFRAMES = ("default", "arducopter")
     help="Errors of the odometry, such as per_m=0.05,per_rad=0.05. [default: none]",
 )
 @click.option(
+    "--localization",
+    type=click.Choice(("simulator", "slam")),
+    default="simulator",
+    show_default=True,
+    help="How robots know their places: exactly, or by their LIDARs without a map.",
+)
+@click.option(
     "--scan-range",
     type=POSITIVE,
     default=2 * math.pi,

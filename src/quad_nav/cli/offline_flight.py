@@ -33,6 +33,7 @@ from quad_nav.scenario.goal_plans import unreachable_goals
 from quad_nav.scenario.rules import RULES
 from quad_nav.sim.flight import AIRFRAMES
 from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.localization import LocalizationMaker
 from quad_nav.sim.odometry import OdometryErrors
 from quad_nav.sim.simulation_params import SimulationParams
 
@@ -76,7 +77,8 @@ def fly_mission(
             quiet=quiet,
             suffixes={"--report": HTML},
         )
-        options = _options(**given)
+        localization, errors = _localization(given.pop("localization"))
+        options = replace(_options(**given), localization=localization)
         with clock("reading the mission", quiet):
             setup = read_setup(options)
         page = _page(served) if web else None
@@ -84,7 +86,7 @@ def fly_mission(
     while True:
         with exit_on_faults():
             drawn = FlightPictures(setup, outputs)
-            observers = _observers(record)
+            observers = [*_observers(record), *errors]
             if not quiet:
                 _show_warnings(setup)
             facts = offline_facts(options, setup, ["quad", *sys.argv[1:]])
@@ -170,6 +172,14 @@ def mission_options(parameters: Tuple[str, ...], **given: Any) -> FlightOptions:
     return options
 
 
+def _localization(name: str) -> Tuple[Optional[LocalizationMaker], List[Any]]:
+    """Return what finds the robots' places, and the observer that measures its errors."""
+    if name == "simulator":
+        return None, []
+    module = add_ons.load("quad_localization.offline", "--localization")
+    return module.MAKERS[name], [module.LocalizationErrors()]
+
+
 def _observers(record: Optional[Path]) -> List[FlightObserver]:
     """Create the recorder, if there is to be one; imported here, because it loads slowly."""
     if record is None:
@@ -195,9 +205,11 @@ def _fly(
     with _StopOnSignal() as stop:
         flown = _summary(setup, [*observers, *pictures.observers, *bar, stop], processes, quiet)
     interventions = () if page is None else tuple(page.interventions)
+    found = [one for one in observers if hasattr(one, "figures")]
+    facts = {**facts, "localization": found[0].figures() if found else None}
     summary = replace(flown, facts=facts, interventions=interventions)
     width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns
-    overview = table(summary, width)
+    overview = "\n".join([table(summary, width), *(one.line() for one in found)])
     if not quiet:
         echo_lines(overview, err=outputs.use_stdout)
     else:  # the table has the reason to end early, such as a recording on a full disk

@@ -23,10 +23,11 @@ LIDARs off, replace worker processes, reset the simulation.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import List, Mapping, Sequence, Tuple
+from typing import List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.config import Configuration
 from quad_nav.scenario.flight_setup import FlightSetup
+from quad_nav.sim.localization import LocalizationMaker
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.simulation_params import SimulationParams
 
@@ -45,6 +46,8 @@ class LoopSetup:
         seed: Of jitter, noise and drift.
         start_step: Step at which the clock starts.
         gui: Open the engine's window.
+        localization: Makes what finds the robots' places; None if they know them. All robots have
+            to be in one process with it.
     """
 
     scene: Scene
@@ -55,6 +58,7 @@ class LoopSetup:
     seed: int = 0
     start_step: int = 0
     gui: bool = False
+    localization: Optional[LocalizationMaker] = None
 
 
 def offline_setup(setup: FlightSetup) -> LoopSetup:
@@ -66,6 +70,7 @@ def offline_setup(setup: FlightSetup) -> LoopSetup:
         dict(enumerate(setup.configurations)),
         setup.steps_per_scan,
         setup.seed,
+        localization=setup.localization,
     )
 
 

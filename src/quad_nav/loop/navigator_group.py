@@ -30,6 +30,7 @@ from quad_nav.scenario.navigator_host import NavigatorHost
 from quad_nav.scenario.scene_map import SceneMaps
 from quad_nav.sim.casters import Lidars
 from quad_nav.sim.lidar import base_from_lidar
+from quad_nav.sim.localization import believed_states
 from quad_nav.sim.odometry import FIXED_FRAMES, pose_in
 from quad_nav.sim.robot_state import RobotState, RobotStates
 from quad_nav.timing import is_due
@@ -68,6 +69,7 @@ class LoopRobot(NavigatorHost):
         due_s: Time before which no tick is due, unless a goal waits. Who changes the navigator
             between ticks sets it to -inf.
         frames: The odometry frames of all robots now.
+        is_lost: The robot does not know where it is.
     """
 
     def __init__(self, configuration: Configuration, number: int) -> None:
@@ -75,7 +77,7 @@ class LoopRobot(NavigatorHost):
         super().__init__(configuration, number)
         self.waiting_goal: Optional[Pose2D] = None
         self.due_s = -math.inf
-        self._number, self.frames = number, FIXED_FRAMES
+        self._number, self.frames, self.is_lost = number, FIXED_FRAMES, False
         self._lidar = self.new_intake(self.lidar_sinks())
 
     def lidar_sinks(self) -> List[Sink]:
@@ -157,6 +159,8 @@ class LoopRobot(NavigatorHost):
 
     def _located(self, map_from_base: Pose3D) -> RobotPoses:
         """Express the robot's pose in the frames of the costmaps."""
+        if self.is_lost:
+            return RobotPoses(None, None)
         if self.frames.rows is None:
             pose = map_from_base.to_2d()
             return RobotPoses(pose, pose)
@@ -185,6 +189,7 @@ class NavigatorGroup:
         intentions: Intentions in ``map`` of all robots of the set-up.
         lidar_enabled: bool[n], LIDARs that are on, of all robots of the set-up.
         last_scans: The last scans, by the robots' numbers.
+        localization: Finds the robots' places; None if they know them.
     """
 
     def __init__(self, setup: LoopSetup, robots: Sequence[int], lidars: Lidars) -> None:
@@ -195,6 +200,8 @@ class NavigatorGroup:
         self.intentions = [Intention(idle_priority(n)) for n in range(len(setup.names))]
         self.last_scans: Dict[int, LocatedScan] = {}
         self._wave = Wavefront()
+        make = setup.localization
+        self.localization = make(setup.scene, len(setup.names)) if make else None
         self.robots = {number: self.new_robot(number) for number in robots}
         self.set_maps()
 
@@ -222,12 +229,39 @@ class NavigatorGroup:
         scans = {}
         numbers = [number for number in self.robots if self.lidar_enabled[number]]
         for number, scan in zip(numbers, self._lidars.scan(states.bodies, numbers, now_s)):
-            map_from_lidar = states[number].map_from_base.compose(base_from_lidar)
-            self.robots[number].frames = states.frames
-            self.robots[number].add_scan(scan, map_from_lidar, now_s)
-            scans[number] = (scan, map_from_lidar)
+            scans[number] = (scan, states[number].map_from_base.compose(base_from_lidar))
+            if self.localization is not None:
+                map_from_odom = states.frames.map_from_odom(number)
+                lidar, base = scans[number][1], states[number].map_from_base
+                self.localization.add_scan(
+                    number,
+                    scan,
+                    pose_in(map_from_odom, base).to_2d(),
+                    pose_in(map_from_odom, lidar),
+                )
+        self._hand_over(scans, now_s, states)
         self.last_scans = scans
         return scans
+
+    def _hand_over(
+        self, scans: Mapping[int, LocatedScan], now_s: float, states: RobotStates
+    ) -> None:
+        """Hand scans to the navigators, from where the robots believe that their LIDARs are."""
+        believed = self._believed(states)
+        for number, (scan, map_from_lidar) in scans.items():
+            robot = self.robots[number]
+            if self.localization is not None:
+                map_from_lidar = believed[number].map_from_base.compose(base_from_lidar)
+            if not robot.is_lost:
+                robot.add_scan(scan, map_from_lidar, now_s)
+
+    def _believed(self, states: RobotStates) -> RobotStates:
+        """Return the states as the robots believe them, and tell these where they are."""
+        believed = believed_states(states, self.localization)
+        for number, robot in self.robots.items():
+            robot.frames = believed.frames
+            robot.is_lost = self.localization is not None and self.localization.is_lost(number)
+        return believed
 
     @property
     def due_s(self) -> float:
@@ -249,8 +283,7 @@ class NavigatorGroup:
             states: States of all robots.
             goals: New goals in ``map`` of robots of this group, by number.
         """
-        for robot in self.robots.values():
-            robot.frames = states.frames
+        states = self._believed(states)
         for number, goal in goals.items():
             self.robots[number].waiting_goal = goal
         self.before_ticks(now_s)

@@ -28,6 +28,7 @@ FACTS = (
     "airframe",
     "jitter_m",
     "odom_drift",
+    "localization",
     "lidar",
     "time_limit_s",
 )

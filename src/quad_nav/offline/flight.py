@@ -88,8 +88,9 @@ class Flight:
     """A mission from its start, advanced by one period of odometry at a time.
 
     LIDARs and navigators are divided among ``processes``; the flight does not depend on their
-    number. There is one process if an observer needs that, or if the physics engine casts the
-    beams. Without ``navigators`` nothing scans or commands but who calls the simulation.
+    number. There is one process if an observer needs that, if the physics engine casts the beams,
+    or if robots find their places. Without ``navigators`` nothing scans or commands but who calls
+    the simulation.
     """
 
     def __init__(
@@ -125,6 +126,7 @@ class Flight:
         if (
             any(observer.needs_single_process for observer in self._observers)
             or self.setup.simulation.lidar_caster != "kernel"
+            or self.setup.localization is not None
         ):
             processes = 1
         reads_ticks = any(

@@ -26,6 +26,7 @@ from quad_nav.scenario.scenario import (
     tried,
 )
 from quad_nav.scenario.scene_map import scene_map_problem
+from quad_nav.sim.localization import LocalizationMaker
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.simulation_params import SimulationParams
 from quad_nav.sim.start_poses import start_poses
@@ -50,6 +51,7 @@ class FlightOptions:
         configurations: Configurations of the robots, if they are there already, instead of those
             that ``config`` and ``parameters`` name.
         strict: Refuse ``parameters`` that have no effect.
+        localization: Makes what finds the robots' places; None if they know them.
     """
 
     scene: Optional[Path]
@@ -64,6 +66,7 @@ class FlightOptions:
     simulation: SimulationParams = field(default_factory=SimulationParams)
     configurations: Tuple[Configuration, ...] = ()
     strict: bool = True
+    localization: Optional[LocalizationMaker] = None
 
 
 @dataclass(frozen=True)
@@ -83,6 +86,7 @@ class FlightSetup:
     seed: int = 0
     time_limit_s: float = math.inf
     warnings: Tuple[str, ...] = ()
+    localization: Optional[LocalizationMaker] = None
 
     @property
     def robot_radius_m(self) -> float:
@@ -126,6 +130,7 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         options.seed,
         options.time_limit_s,
         warnings=(*told, *warnings),
+        localization=options.localization,
     )
 
 

@@ -1,0 +1,77 @@
+"""Localization in offline flights, and how far it is from the truth, which a simulation has."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Dict, List
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_localization.slam import Slam
+from quad_nav.geometry import Pose2D, Pose3D, Scan
+from quad_nav.offline.flight import Flight, FlightObserver
+from quad_nav.sim.localization import believed_states
+from quad_nav.sim.scene import Scene
+
+
+class SlamLocalization:
+    """``Slam`` for the loop: ``sim.localization.Localization``."""
+
+    def __init__(self, _scene: Scene, robots: int) -> None:
+        """Start without a map; the odometry frames begin at ``map``."""
+        self.slam = Slam({robot: Pose2D(0.0, 0.0) for robot in range(robots)})
+
+    def add_scan(
+        self, robot: int, scan: Scan, odom_from_base: Pose2D, odom_from_lidar: Pose3D
+    ) -> None:
+        """Take a scan."""
+        self.slam.add_scan(robot, scan, odom_from_base, odom_from_lidar)
+
+    def map_from_odom(self, robot: int) -> Pose2D:
+        """Return where a robot's odometry frame is."""
+        place = self.slam.poses.get(robot)
+        return Pose2D(0.0, 0.0) if place is None else place.map_from_odom
+
+    def is_lost(self, robot: int) -> bool:
+        """Return whether a robot does not know its place."""
+        return robot not in self.slam.poses or self.slam.poses[robot].is_lost
+
+
+MAKERS = {"slam": SlamLocalization}
+"""By the names of the option ``--localization``."""
+
+
+class LocalizationErrors(FlightObserver):
+    """Differences of all robots' believed poses to the true ones, at every odometry."""
+
+    needs_single_process = True
+
+    def __init__(self) -> None:
+        self._errors: List[NDArray[np.float64]] = []
+
+    def on_move(self, flight: Flight) -> None:
+        """Note the errors of now."""
+        believed = believed_states(flight.states, flight.loop.group.localization)
+        errors = believed.poses - flight.states.poses
+        turns_rad = np.abs(np.remainder(errors[:, 2] + math.pi, 2.0 * math.pi) - math.pi)
+        self._errors.append(np.column_stack([np.hypot(errors[:, 0], errors[:, 1]), turns_rad]))
+
+    def line(self) -> str:
+        """Return the figures for people."""
+        far, turned = (self.figures()[name] for name in ("position_error_m", "yaw_error_rad"))
+        return (
+            f"Localization: {far['median']:.3f} m and {turned['median']:.3f} rad from the truth, in"
+            f" 95 % of the time below {far['p95']:.3f} m and {turned['p95']:.3f} rad."
+        )
+
+    def figures(self) -> Dict[str, Any]:
+        """Return the errors' medians and 95th percentiles, rounded to 1 mm and 1 mrad."""
+        errors = np.concatenate(self._errors) if self._errors else np.zeros((1, 2))
+        (middle_m, middle_rad), (high_m, high_rad) = np.percentile(
+            errors, [50, 95], axis=0
+        ).tolist()
+        return {
+            "position_error_m": {"median": round(middle_m, 3), "p95": round(high_m, 3)},
+            "yaw_error_rad": {"median": round(middle_rad, 3), "p95": round(high_rad, 3)},
+        }

@@ -1,0 +1,55 @@
+"""Localization: robots that find their places by their scans, instead of knowing them.
+
+Bodies and LIDARs stay where they are; navigators get what the robots believe.
+"""
+
+from __future__ import annotations
+
+from typing import Callable, Optional, Protocol
+
+import numpy as np
+
+from quad_nav.geometry import Pose2D, Pose3D, Scan, multiply_quaternions, quaternion_from_yaw
+from quad_nav.sim.flight import BodyState
+from quad_nav.sim.odometry import OdomFrames
+from quad_nav.sim.robot_state import RobotStates
+from quad_nav.sim.scene import Scene
+
+
+class Localization(Protocol):
+    """Finds the odometry frames of all robots in ``map``."""
+
+    def add_scan(
+        self, robot: int, scan: Scan, odom_from_base: Pose2D, odom_from_lidar: Pose3D
+    ) -> None:
+        """Take a scan, with the poses of the robot and of its LIDAR by odometry at its stamp."""
+
+    def map_from_odom(self, robot: int) -> Pose2D:
+        """Return where a robot's odometry frame is, as far as it knows."""
+
+    def is_lost(self, robot: int) -> bool:
+        """Return whether a robot does not know its place."""
+
+
+LocalizationMaker = Callable[[Scene, int], Localization]
+"""Maker of the localization of a flight: of its scene, and the number of robots."""
+
+
+def believed_states(states: RobotStates, localization: Optional[Localization]) -> RobotStates:
+    """Return the states as the robots believe them; without localization they know them."""
+    if localization is None:
+        return states
+    count, bodies = len(states), states.bodies
+    rows, frames = bodies.rows.copy(), np.empty((count, 3))
+    for robot in range(count):
+        frame = localization.map_from_odom(robot)
+        frames[robot] = frame.x_m, frame.y_m, frame.yaw_rad
+        error = frame.compose(states.frames.map_from_odom(robot).inverse())
+        row = rows[robot]
+        row[:2] = error.transform(row[0], row[1])
+        turn = quaternion_from_yaw(error.yaw_rad)
+        x, y, z, w = row[3:7].tolist()
+        row[3:7] = multiply_quaternions(turn, (x, y, z, w))
+        row[7:9] = error.rotate(row[7], row[8])
+        row[10:12] = error.rotate(row[10], row[11])
+    return RobotStates(BodyState(rows, bodies.obstacles), OdomFrames(frames))
