@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple, Union
@@ -38,6 +39,8 @@ MAX_BYTES = 4 * 1024 * 1024
 MAX_GOALS = 10_000
 DEFAULT_YAW_TOLERANCE_RAD = 0.1
 """Tolerance of a robot whose local planner is unknown or has no ``yaw_goal_tolerance``."""
+
+_OWN_NAME = re.compile(r"quad\d+_goals\.json$")
 
 PlaceCheck = Callable[[float, float], Optional[str]]
 """Returns what is wrong with a position (x, y) in ``map``, or None if a robot fits there."""
@@ -173,7 +176,8 @@ def parse_goals(
         InputError: The content has faults; lists all of them.
     """
     text = decoded(content, name)
-    waypoints = read_waypoints(text, name)
+    # A mistake in a file with our name is a mistake, not another format.
+    waypoints = None if _OWN_NAME.search(name) else read_waypoints(text, name)
     if waypoints is not None:
         return goals_of(waypoints, name, check_place, defaults, robot)
     tree, problems = _tree(text, name)

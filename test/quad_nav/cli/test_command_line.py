@@ -13,9 +13,9 @@ import pytest
 from click.testing import CliRunner
 
 from quad_nav.cli import COMMANDS, main
-from quad_nav.cli.fly import LIDAR_CASTERS, MAX_DRIFT
+from quad_nav.cli.fly import LIDAR_CASTERS
 from quad_nav.files.shipped import config_names
-from quad_nav.sim import odometry, simulation_params
+from quad_nav.sim import simulation_params
 
 SOURCES = Path(__file__).resolve().parents[3] / "src"
 ENGINE = ("numpy", "numba", "pybullet", "scipy", "matplotlib", "joblib", "optuna", "rich.progress")
@@ -99,7 +99,6 @@ def test_ctrl_c_before_the_flight(monkeypatch):
 
 def test_constants_of_the_options_are_those_of_the_engine():
     assert simulation_params.LIDAR_CASTERS == LIDAR_CASTERS
-    assert odometry.MAX_DRIFT == MAX_DRIFT
 
 
 @pytest.mark.parametrize("word, hint", [("fli", "did you mean 'fly'?"), ("zzz", "see quad --help")])

@@ -252,6 +252,7 @@ DOCUMENTED = {
     "goals": None,
     "jitter_m": "inf",
     "odom_drift": None,
+    "localization": None,
     "lidar": None,
     "time_limit_s": None,
 }

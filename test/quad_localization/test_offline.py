@@ -1,0 +1,57 @@
+"""Offline flights of robots that find their places by their LIDARs."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from quad_localization.offline import LocalizationErrors, SlamLocalization
+from quad_nav.cli.__main__ import main
+from quad_nav.geometry import Pose2D, quaternion_from_yaw
+from quad_nav.sim.flight import BodyState
+from quad_nav.sim.localization import believed_states
+from quad_nav.sim.odometry import OdomFrames
+from quad_nav.sim.robot_state import RobotStates
+
+
+class Turned:
+    """A localization that believes the odometry frame to be turned by a quarter."""
+
+    def map_from_odom(self, _robot):
+        return Pose2D(1.0, 0.0, math.pi / 2)
+
+
+def test_what_a_robot_believes_follows_from_its_odometry():
+    """By odometry the robot is at (2, 0) and looks along x, by the frame at (1, 2) and along y."""
+    row = np.zeros((1, 13))
+    row[0, :3], row[0, 3:7] = (5.0, 4.0, 1.0), quaternion_from_yaw(0.0)
+    row[0, 7:10] = 0.3, 0.0, 0.0
+    states = RobotStates(BodyState(row), OdomFrames(np.array([[3.0, 4.0, 0.0]])))
+    found = believed_states(states, Turned())[0]
+    assert found.map_from_base.translation == pytest.approx((1.0, 2.0, 1.0))
+    assert found.map_from_base.yaw_rad == pytest.approx(math.pi / 2)
+    assert (found.twist.vx_mps, found.twist.vy_mps) == pytest.approx((0.3, 0.0))
+    assert found.map_velocities[:2] == pytest.approx((0.0, 0.3))
+    assert believed_states(states, None) is states
+
+
+def test_the_tutorial_s_mission_without_a_map(tmp_path):
+    """Odometry that errs by 5 % of a metre; what is believed stays within 0.1 m of the truth."""
+    options = ["--localization", "slam", "--odom-drift", "per_m=0.05,per_rad=0.05", "--seed", "5"]
+    path = tmp_path / "flight.json"
+    result = CliRunner().invoke(main, ["fly", *options, "--quiet", "--json", str(path)])
+    assert result.exit_code == 0, result.output
+    summary = json.loads(path.read_text())
+    assert [goal["reached"] for one in summary["robots"] for goal in one["goals"]] == 6 * [True]
+    assert summary["contacts"] == []
+    assert summary["localization"]["position_error_m"]["p95"] < 0.1
+    assert summary["localization"]["yaw_error_rad"]["p95"] < 0.03
+
+
+def test_robots_that_have_not_seen_anything_are_lost():
+    assert SlamLocalization(None, 2).is_lost(1)
+    assert LocalizationErrors().figures()["position_error_m"] == {"median": 0.0, "p95": 0.0}
