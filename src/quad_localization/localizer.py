@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Dict, Optional, Tuple
 
 import numpy as np
@@ -27,12 +26,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PoseEstimate:
-    """A pose in the map and its covariance.
-
-    Attributes:
-        pose: The pose.
-        covariance: float64[3, 3] of x, y in metres and yaw in radians.
-    """
+    """A pose in the map, and its covariance float64[3, 3] of x, y in metres and yaw in radians."""
 
     pose: Pose2D
     covariance: Floats
@@ -47,14 +41,14 @@ class Observation:
         scan: The scan.
         base_from_laser: Mount of the laser.
         odom_from_base: Pose by odometry at the stamp of the scan.
-        is_left_out: bool[n], beams that count as not measured, such as those on peers.
+        peers: float64[k, 2], places of known peers in the map, metres.
     """
 
     laser: str
     scan: Scan
     base_from_laser: Pose3D
     odom_from_base: Pose3D
-    is_left_out: Optional[NDArray[np.bool_]] = None
+    peers: Floats = field(default_factory=lambda: np.empty((0, 2)))
 
 
 @dataclass(frozen=True)
@@ -98,8 +92,7 @@ class Amcl:
         self.map_from_odom: Optional[Pose3D] = None
         self.is_update_requested = False
         self.update_count = 0
-        self._random = seeded(seed)
-        self._spreads = 0
+        self._random, self._spreads = seeded(seed), 0
         self._grid: Optional[OccupancyMap] = None
         self._field: Optional[LikelihoodField] = None
         self._lasers: Dict[str, Laser] = {}
@@ -110,7 +103,7 @@ class Amcl:
     def set_map(self, grid: OccupancyMap, initial: PoseEstimate) -> None:
         """Take a map, and begin at a pose, or at the one that was given before.
 
-        A further map leaves a robot that is localised where it is. Upstream begins anew.
+        A further map leaves a robot that is localised where it is; upstream begins anew.
         """
         self._grid = grid
         self._make_sensors()
@@ -157,25 +150,17 @@ class Amcl:
 
     def _make_sensors(self) -> None:
         """Make the likelihood field anew, and forget the lasers."""
-        params, grid = self.params, self._grid
-        assert grid is not None
-        self._lasers = {}
-        self._field = None
-        if params.laser_model_type != BEAM:
-            self._field = likelihood_field(
-                grid,
-                params.laser_likelihood_max_dist_m,
-                params.laser_z_hit,
-                params.laser_sigma_hit_m,
-            )
+        params, self._lasers, self._field = self.params, {}, None
+        if params.laser_model_type != BEAM and self._grid is not None:
+            distance_m, sigma_m = params.laser_likelihood_max_dist_m, params.laser_sigma_hit_m
+            self._field = likelihood_field(self._grid, distance_m, params.laser_z_hit, sigma_m)
 
     def _spread(self, about: PoseEstimate) -> None:
         assert self.particles is not None
         self._spreads += 1
         if self.params.upstream:
             self.seed(self._spreads)
-        pose = about.pose
-        mean = np.array((pose.x_m, pose.y_m, pose.yaw_rad))
+        mean = np.array((about.pose.x_m, about.pose.y_m, about.pose.yaw_rad))
         self.particles.spread_normally(mean, about.covariance)
         self._has_begun = False
 
@@ -183,45 +168,33 @@ class Amcl:
         """Take a scan; return None if nothing was done with it."""
         if self.particles is None or self._grid is None:
             return None
-        params, odometry = self.params, _planar(seen.odom_from_base)
-        beams = beams_of(
-            seen.scan, seen.base_from_laser, params.laser_min_range_m, params.laser_max_range_m
-        )
-        if beams is None and not params.upstream:
+        least_m, largest_m = self.params.laser_min_range_m, self.params.laser_max_range_m
+        beams = beams_of(seen.scan, seen.base_from_laser, least_m, largest_m)
+        if beams is None and not self.params.upstream:
             return None
-        laser = self._laser(seen)
-        begins, moved = not self._has_begun, False
+        if seen.laser not in self._lasers:  # whose mount stays that of its first scan
+            mount = (float(seen.base_from_laser.x_m), float(seen.base_from_laser.y_m))
+            self._lasers[seen.laser] = Laser(self.params, self._grid, self._field, mount)
+        laser, at = self._lasers[seen.laser], seen.odom_from_base
+        odometry = Pose2D(at.x_m, at.y_m, tilted_yaw(at.quaternion))
+        begins = not self._has_begun
         if begins:
             self._odometry, self._has_begun, self.update_count = odometry, True, 0
-            self._mark_lasers()
-        else:
-            if self._is_update_due(odometry):
-                self._mark_lasers()
-            moved = laser.is_due
-            if moved:
-                self._move(odometry)
-        is_weighed = is_resampled = shows_cloud = False
+        if begins or self._is_update_due(odometry):
+            for one in self._lasers.values():
+                one.is_due = True
+        moved = laser.is_due and not begins
+        if moved:
+            self._move(odometry)
+        is_weighed = is_resampled = False
+        shows_cloud = laser.is_due and not self.is_update_requested
         if laser.is_due:
             if beams is None:  # upstream has moved the particles, and will move them again
                 return None
-            if seen.is_left_out is not None:
-                beams.ranges_m[seen.is_left_out] = np.nan
+            self._leave_out_peers(beams, seen)
             is_weighed, is_resampled = self._weigh(laser, beams, odometry)
-            shows_cloud = not self.is_update_requested
         estimate = self._estimate(seen) if is_resampled or begins else None
         return Update(moved, is_weighed, is_resampled, estimate, shows_cloud, self.map_from_odom)
-
-    def _laser(self, seen: Observation) -> Laser:
-        """Return the laser of a scan, made at its first one; the mount stays the first one's."""
-        if seen.laser not in self._lasers:
-            assert self._grid is not None
-            mount = (float(seen.base_from_laser.x_m), float(seen.base_from_laser.y_m))
-            self._lasers[seen.laser] = Laser(self.params, self._grid, self._field, mount)
-        return self._lasers[seen.laser]
-
-    def _mark_lasers(self) -> None:
-        for laser in self._lasers.values():
-            laser.is_due = True
 
     def _is_update_due(self, odometry: Pose2D) -> bool:
         """Tell whether the robot has moved enough, or an update was requested."""
@@ -236,23 +209,29 @@ class Amcl:
 
     def _move(self, odometry: Pose2D) -> None:
         assert self.particles is not None
-        params, before = self.params, self._odometry
+        one, before = self.params, self._odometry
         turn_rad = angle_difference(odometry.yaw_rad, before.yaw_rad)
-        move = move_diff if params.odom_model_type.startswith("diff") else move_omni
-        move(
-            self.particles.poses,
-            odometry.yaw_rad - turn_rad,
-            (odometry.x_m - before.x_m, odometry.y_m - before.y_m, turn_rad),
-            (
-                params.odom_alpha1,
-                params.odom_alpha2,
-                params.odom_alpha3,
-                params.odom_alpha4,
-                params.odom_alpha5,
-            ),
-            params.odom_model_type.endswith("-corrected"),
-            self._random,
+        delta = (odometry.x_m - before.x_m, odometry.y_m - before.y_m, turn_rad)
+        alphas = (one.odom_alpha1, one.odom_alpha2, one.odom_alpha3, one.odom_alpha4)
+        move = move_diff if one.odom_model_type.startswith("diff") else move_omni
+        is_corrected = one.odom_model_type.endswith("-corrected")
+        old_yaw_rad = odometry.yaw_rad - turn_rad
+        poses, alphas5 = self.particles.poses, (*alphas, one.odom_alpha5)
+        move(poses, old_yaw_rad, delta, alphas5, is_corrected, self._random)
+
+    def _leave_out_peers(self, beams: Beams, seen: Observation) -> None:
+        """Take the ranges of beams that end on peers out; the latest transform says where."""
+        if self.map_from_odom is None or not len(seen.peers):
+            return
+        base = self.map_from_odom.compose(seen.odom_from_base).to_2d()
+        x_m, y_m = base.transform(seen.base_from_laser.x_m, seen.base_from_laser.y_m)
+        angles_rad = base.yaw_rad + beams.bearings_rad
+        ends = np.array((x_m, y_m)) + beams.ranges_m[:, None] * np.column_stack(
+            (np.cos(angles_rad), np.sin(angles_rad))
         )
+        with np.errstate(over="ignore", invalid="ignore"):  # of ranges without a return
+            away_m = np.linalg.norm(ends[:, None] - seen.peers, axis=2).min(axis=1)
+        beams.ranges_m[away_m < self.params.peer_radius_m] = np.nan
 
     def _weigh(self, laser: Laser, beams: Beams, odometry: Pose2D) -> Tuple[bool, bool]:
         """Weigh the particles by a scan, and resample if due; return what was done."""
@@ -271,20 +250,12 @@ class Amcl:
         """Return the mean of the heaviest cluster, and note the transform that follows."""
         assert self.particles is not None
         statistics = self.particles.statistics
-        best = statistics.best
-        if best < 0:
+        if statistics.best < 0:
             return None
-        pose = Pose2D(*statistics.means[best].tolist())
-        covariance = np.zeros((3, 3))
-        covariance[:2, :2] = statistics.covariance[:2, :2]
-        covariance[2, 2] = statistics.covariance[2, 2]
-        self.estimate = PoseEstimate(pose, covariance)
+        pose = Pose2D(*statistics.means[statistics.best].tolist())
+        self.estimate = PoseEstimate(pose, statistics.covariance)
         self.map_from_odom = pose.to_3d().compose(seen.odom_from_base.inverse())
         return self.estimate
-
-
-def _planar(pose: Pose3D) -> Pose2D:
-    return Pose2D(pose.x_m, pose.y_m, tilted_yaw(pose.quaternion))
 
 
 def is_covariance(matrix: Floats) -> bool:
@@ -292,4 +263,4 @@ def is_covariance(matrix: Floats) -> bool:
     if not np.all(np.isfinite(matrix)):
         return False
     values = np.linalg.eigvalsh(0.5 * (matrix + matrix.T))
-    return bool(values[0] >= -1e-9 * max(1.0, math.fabs(values[-1])))
+    return bool(values[0] >= -1e-9 * max(1.0, abs(float(values[-1]))))

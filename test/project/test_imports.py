@@ -51,7 +51,7 @@ BETWEEN_ADD_ONS = {
     ("quad_tune/test_barn_course.py", "quad_bench"),
 }
 
-ROS = ("quad_nav/ros/", "quad_vehicles/ros/", "quad_web/ros/")
+ROS = ("quad_nav/ros/", "quad_localization/ros/", "quad_vehicles/ros/", "quad_web/ros/")
 # The files or folders in which a third-party package may be imported.
 PLACES = {
     "click": ("quad_nav/cli/", "quad_web/cli/", "quad_tune/cli/", "quad_bench/cli/"),

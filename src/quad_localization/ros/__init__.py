@@ -1,1 +1,1 @@
-"""Nodes of localization: a thin shell around the modules of this package."""
+"""The nodes of localization: ``amcl``, ``slam``, ``map_server`` and ``map_saver``."""

@@ -20,7 +20,7 @@ from tf2_msgs.msg import TFMessage
 
 from quad_localization.ros.map_messages import grid_message
 from quad_localization.slam import Slam, SlamPose
-from quad_localization.warm_up import localize
+from quad_localization.warm_up import warm_up_slam
 from quad_nav.errors import excerpt
 from quad_nav.files.kernel_cache import COMPILING, announced
 from quad_nav.files.values import is_number, is_whole
@@ -208,7 +208,7 @@ def main() -> int:
     """Run the node; return 0, or 2 if a parameter is not valid."""
     init_node("slam")
     with announced(lambda: rospy.loginfo("%s", COMPILING)):
-        localize()
+        warm_up_slam()
     robots = rospy.get_param("~robots", 2)
     if not is_whole(robots) or robots < 1:
         rospy.logfatal("slam: robots: %s; expected a whole number, at least 1", robots)
