@@ -309,7 +309,16 @@ class StateMachine:
         if self.params.recovery_behavior_enabled and self._recovery.start(tick, poses):
             self._step_recovery(tick, poses)
         else:
-            self._finish(tick, Outcome(False, self._recovery.trigger.value))
+            self._finish(tick, Outcome(False, self._failure_text(self._recovery.trigger)))
+
+    def _failure_text(self, trigger: Trigger) -> str:
+        """Return move_base's text, with what it leaves to be guessed."""
+        costmap, goal = self._global, self.goal
+        is_off = goal is not None and costmap.spec.cell_of(goal.x_m, goal.y_m) is None
+        if trigger is Trigger.PLANNING and costmap.params.rolling_window and is_off:
+            extent = costmap.spec.extent
+            return f"{trigger.value} The goal is off the rolling global costmap, {extent}."
+        return trigger.value
 
     @property
     def is_blocked_by_recovery(self) -> bool:

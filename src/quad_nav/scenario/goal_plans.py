@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
@@ -64,7 +65,12 @@ class GoalPlans:
         """
         costmap, configuration = self.costmap(number), self._configurations.get(number)
         planner = configuration.global_planner if configuration else None
-        if costmap is None or not isinstance(planner, (NavfnParams, SearchPlannerParams)):
+        if (
+            costmap is None
+            or configuration is None
+            or not isinstance(planner, (NavfnParams, SearchPlannerParams))
+            or any(map(partial(_is_off_window, configuration.global_costmap), poses, poses[1:]))
+        ):
             return False
         lethal = min(getattr(planner, "lethal_cost", INSCRIBED), INSCRIBED)
         if (costmap.params, lethal) not in self._parts:
@@ -103,6 +109,13 @@ class GoalPlans:
             if fault:
                 continue
             goal_name = f"goal {index + 1}"
+            if _is_off_window(configuration.global_costmap, here, goal.pose):
+                warnings.append(
+                    f"quad{number}: {goal_name} ({goal.x_m:g}, {goal.y_m:g}): off the rolling "
+                    f"global_costmap around {name}, to which no plan leads; expected a larger one, "
+                    "or goals between"
+                )
+                continue
             try:
                 with closed_edge(costmap, here, goal.pose, configuration.navigator.plan_inside_map):
                     plan = planner.make_plan(costmap.spec, costmap.costs.copy(), here, goal.pose)
@@ -128,6 +141,12 @@ class GoalPlans:
         if params not in self._costmaps:
             self._costmaps[params] = _costmap(params, self.scene, has_no_place)
         return self._costmaps[params]
+
+
+def _is_off_window(params: CostmapParams, here: Pose2D, goal: Pose2D) -> bool:
+    """Return whether a goal is off a costmap that rolls with a robot, which is here."""
+    x_m, y_m = abs(goal.x_m - here.x_m), abs(goal.y_m - here.y_m)
+    return params.rolling_window and (x_m >= params.width_m / 2 or y_m >= params.height_m / 2)
 
 
 def _without_sensors(params: CostmapParams) -> CostmapParams:

@@ -174,6 +174,19 @@ def test_no_plan_within_patience_runs_all_recoveries_and_aborts():
     assert ended == pytest.approx(3 * 2.0, abs=0.5)  # patience before each of three endings
 
 
+@pytest.mark.parametrize(
+    "x_m, rolls, is_told", [(11.0, True, True), (11.0, False, False), (5.0, True, False)]
+)
+def test_a_goal_off_a_rolling_costmap_is_told(x_m, rolls, is_told):
+    """The costmap is 10 m wide."""
+    flight = Flight(planner_patience_s=1.0, recovery_behavior_enabled=False)
+    flight.planner.fails, flight.global_costmap.params.rolling_window = True, rolls
+    flight.navigator.set_goal(Pose2D(x_m, 1.0), 0.0)
+    off = " The goal is off the rolling global costmap, x 0.00 to 10.00, y 0.00 to 10.00 m."
+    text = Trigger.PLANNING.value + off * is_told
+    assert outcomes(flight.until(5.0)) == [(False, text)]
+
+
 def test_failing_control_stops_replans_and_aborts_after_its_patience():
     flight = Flight(controller_patience_s=1.0, recovery_behavior_enabled=False)
     flight.controller.fails = True

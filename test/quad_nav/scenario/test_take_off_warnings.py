@@ -60,6 +60,15 @@ def test_the_sequencer_tells_of_the_map_with_the_file_to_change(tmp_path):
     assert "in robot0.yaml global_costmap: {static_map: true}, and map_server" in line
 
 
+def test_goals_off_a_rolling_costmap_are_told():
+    """From (12, 1.5), goal 1 is 9 m away along x, goal 2 from there 18 m."""
+    rolls = (("rolling_window", True), ("width", 20.0), ("height", 20.0))
+    case, parameters = CASES / "start_pocket", [(f"global_costmap/{k}", v) for k, v in rolls]
+    setup = read_setup(FlightOptions(case / "map.yaml", case, "default", tuple(parameters)))
+    (line,) = unreachable_goals(setup)
+    assert line.startswith("quad0: goal 2 (21, 6): off the rolling global_costmap around goal 1")
+
+
 def inside_room(scene):
     return [k for k, one in enumerate(scene.starts) if 9 < one.x_m < 15 and 3.5 < one.y_m < 8.5]
 
