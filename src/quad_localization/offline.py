@@ -57,13 +57,19 @@ class LocalizationErrors(FlightObserver):
         turns_rad = np.abs(np.remainder(errors[:, 2] + math.pi, 2.0 * math.pi) - math.pi)
         self._errors.append(np.column_stack([np.hypot(errors[:, 0], errors[:, 1]), turns_rad]))
 
-    def line(self) -> str:
-        """Return the figures for people."""
+    @property
+    def note(self) -> str:
+        """The figures for people."""
         far, turned = (self.figures()[name] for name in ("position_error_m", "yaw_error_rad"))
         return (
             f"Localization: {far['median']:.3f} m and {turned['median']:.3f} rad from the truth, in"
             f" 95 % of the time below {far['p95']:.3f} m and {turned['p95']:.3f} rad."
         )
+
+    @property
+    def facts(self) -> Dict[str, Any]:
+        """The figures for the summary."""
+        return {"localization": self.figures()}
 
     def figures(self) -> Dict[str, Any]:
         """Return the errors' medians and 95th percentiles, rounded to 1 mm and 1 mrad."""

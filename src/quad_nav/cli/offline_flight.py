@@ -205,11 +205,11 @@ def _fly(
     with _StopOnSignal() as stop:
         flown = _summary(setup, [*observers, *pictures.observers, *bar, stop], processes, quiet)
     interventions = () if page is None else tuple(page.interventions)
-    found = [one for one in observers if hasattr(one, "figures")]
-    facts = {**facts, "localization": found[0].figures() if found else None}
+    for observer in observers:
+        facts = {**facts, **observer.facts}
     summary = replace(flown, facts=facts, interventions=interventions)
     width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns
-    overview = "\n".join([table(summary, width), *(one.line() for one in found)])
+    overview = "\n".join([table(summary, width), *filter(None, (one.note for one in observers))])
     if not quiet:
         echo_lines(overview, err=outputs.use_stdout)
     else:  # the table has the reason to end early, such as a recording on a full disk

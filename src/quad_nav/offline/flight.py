@@ -46,6 +46,16 @@ class FlightObserver:
         """Reason to end the flight, "" to continue."""
         return ""
 
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """Facts about the flight, by the keys of ``mission.summary.FACTS``."""
+        return {}
+
+    @property
+    def note(self) -> str:
+        """Line below the tables of the flight, "" for none."""
+        return ""
+
     def on_start(self, flight: Flight) -> None:
         """Handle the start: everything is in place at time 0, nothing has moved."""
 
