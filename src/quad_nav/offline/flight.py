@@ -7,7 +7,7 @@ is due. Equal set-ups give equal flights, bit for bit.
 from __future__ import annotations
 
 from functools import partial
-from typing import List, Mapping, Sequence
+from typing import Any, List, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
