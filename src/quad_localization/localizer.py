@@ -18,7 +18,7 @@ from quad_localization.odometry_models import angle_difference, move_diff, move_
 from quad_localization.parameters import BEAM, AmclParams
 from quad_localization.particle_filter import ParticleFilter
 from quad_localization.random_numbers import seeded
-from quad_localization.scan_beams import Beams, beams_of, tilted_yaw
+from quad_localization.scan_beams import Beams, beams_of, levelled, tilted_yaw
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 
 Floats = NDArray[np.float64]
@@ -176,6 +176,8 @@ class Amcl:
             mount = (float(seen.base_from_laser.x_m), float(seen.base_from_laser.y_m))
             self._lasers[seen.laser] = Laser(self.params, self._grid, self._field, mount)
         laser, at = self._lasers[seen.laser], seen.odom_from_base
+        if beams is not None and not self.params.upstream:
+            beams = levelled(beams, at.quaternion)
         odometry = Pose2D(at.x_m, at.y_m, tilted_yaw(at.quaternion))
         begins = not self._has_begun
         if begins:

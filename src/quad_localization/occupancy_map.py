@@ -1,7 +1,8 @@
 """Map of amcl: free, unknown and occupied cells, and rays through them.
 
-Cell (i, j) is centred on ``origin + (i, j) * resolution``. So everything lies half a cell beside
-the costmaps, where that point is the cell's lower left corner.
+In upstream, cell (i, j) is centred on ``origin + (i, j) * resolution``, so that every pose is half
+a cell beside the costmaps, where that point is the cell's lower left corner. Here it is that
+corner.
 """
 
 from __future__ import annotations
@@ -58,6 +59,7 @@ class OccupancyMap:
         resolution_m: float,
         origin_x_m: float,
         origin_y_m: float,
+        upstream: bool = False,
     ) -> OccupancyMap:
         """Read the data of a ``nav_msgs/OccupancyGrid``: 0 is free, 100 occupied, all else unknown.
 
@@ -65,7 +67,9 @@ class OccupancyMap:
         """
         size_y, size_x = occupancy.shape
         half_x, half_y = size_x // 2, size_y // 2
-        centre_x, centre_y = origin_x_m + half_x * resolution_m, origin_y_m + half_y * resolution_m
+        first_m = 0.0 if upstream else 0.5 * resolution_m  # the centre of cell (0, 0)
+        centre_x = origin_x_m + first_m + half_x * resolution_m
+        centre_y = origin_y_m + first_m + half_y * resolution_m
         states = np.full(occupancy.shape, UNKNOWN, np.int8)
         states[occupancy == 0], states[occupancy == 100] = FREE, OCCUPIED
         columns, rows = np.nonzero(states.T == FREE)

@@ -8,11 +8,22 @@ from typing import Any, Dict, List
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_localization.localizer import Amcl, Observation, PoseEstimate
+from quad_localization.occupancy_map import OccupancyMap
+from quad_localization.parameters import read_params
 from quad_localization.slam import Slam
+from quad_nav.errors import InputError
+from quad_nav.files.document import read_yaml
+from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.offline.flight import Flight, FlightObserver
+from quad_nav.scenario.scene_map import scene_map
 from quad_nav.sim.localization import believed_states
 from quad_nav.sim.scene import Scene
+
+MAP_RESOLUTION_M = 0.05
+LOST_M = 0.5
+"""Standard deviation of the position above which a robot counts as lost: half a doorway."""
 
 
 class SlamLocalization:
@@ -23,10 +34,10 @@ class SlamLocalization:
         self.slam = Slam({robot: Pose2D(0.0, 0.0) for robot in range(robots)})
 
     def add_scan(
-        self, robot: int, scan: Scan, odom_from_base: Pose2D, odom_from_lidar: Pose3D
+        self, robot: int, scan: Scan, odom_from_base: Pose3D, odom_from_lidar: Pose3D
     ) -> None:
         """Take a scan."""
-        self.slam.add_scan(robot, scan, odom_from_base, odom_from_lidar)
+        self.slam.add_scan(robot, scan, odom_from_base.to_2d(), odom_from_lidar)
 
     def map_from_odom(self, robot: int) -> Pose2D:
         """Return where a robot's odometry frame is."""
@@ -38,7 +49,57 @@ class SlamLocalization:
         return robot not in self.slam.poses or self.slam.poses[robot].is_lost
 
 
-MAKERS = {"slam": SlamLocalization}
+class AmclLocalization:
+    """``Amcl`` of each robot for the loop, on the map of the scene."""
+
+    def __init__(self, scene: Scene, robots: int) -> None:
+        """Begin at the scene's start poses, from which robots may be displaced.
+
+        Raises:
+            InputError: The shipped parameters have faults.
+        """
+        path = shipped("config", "amcl.yaml")
+        params, faults = read_params(read_yaml(path))
+        if faults:
+            raise InputError([f"{path}: {fault}" for fault in faults])
+        drawn = scene_map(scene, MAP_RESOLUTION_M)
+        spec = drawn.spec
+        grid = OccupancyMap.from_occupancy(
+            drawn.occupancy, spec.resolution_m, spec.origin_x_m, spec.origin_y_m
+        )
+        spread = np.diag([params.initial_cov_xx, params.initial_cov_yy, params.initial_cov_aa])
+        self._amcls = [Amcl(params, seed=robot) for robot in range(robots)]
+        for amcl, start in zip(self._amcls, scene.starts):
+            amcl.set_map(grid, PoseEstimate(start, spread))
+        self._odom_from_base: Dict[int, Pose3D] = {}
+
+    def add_scan(
+        self, robot: int, scan: Scan, odom_from_base: Pose3D, odom_from_lidar: Pose3D
+    ) -> None:
+        """Take a scan; beams that end on peers are left out."""
+        self._odom_from_base[robot] = odom_from_base
+        places = [self._place(peer) for peer in self._odom_from_base if peer != robot]
+        base_from_lidar = odom_from_base.inverse().compose(odom_from_lidar)
+        peers = np.array([(one.x_m, one.y_m) for one in places]).reshape(-1, 2)
+        amcl = self._amcls[robot]
+        amcl.is_update_requested = amcl.is_update_requested or self.is_lost(robot)
+        amcl.update(Observation("lidar", scan, base_from_lidar, odom_from_base, peers))
+
+    def _place(self, robot: int) -> Pose2D:
+        return self.map_from_odom(robot).compose(self._odom_from_base[robot].to_2d())
+
+    def map_from_odom(self, robot: int) -> Pose2D:
+        """Return where a robot's odometry frame is."""
+        pose = self._amcls[robot].map_from_odom
+        return Pose2D(0.0, 0.0) if pose is None else pose.to_2d()
+
+    def is_lost(self, robot: int) -> bool:
+        """Return whether a robot does not know its place, so that it has to hover."""
+        estimate = self._amcls[robot].estimate
+        return estimate is None or math.sqrt(np.trace(estimate.covariance[:2, :2])) > LOST_M
+
+
+MAKERS = {"amcl": AmclLocalization, "slam": SlamLocalization}
 """By the names of the option ``--localization``."""
 
 

@@ -55,3 +55,13 @@ def test_the_tutorial_s_mission_without_a_map(tmp_path):
 def test_robots_that_have_not_seen_anything_are_lost():
     assert SlamLocalization(None, 2).is_lost(1)
     assert LocalizationErrors().figures()["position_error_m"] == {"median": 0.0, "p95": 0.0}
+
+
+def test_amcl_on_the_map_of_the_scene(tmp_path):
+    options = ["--localization", "amcl", "--odom-drift", "per_m=0.05,per_rad=0.05", "--seed", "5"]
+    path = tmp_path / "flight.json"
+    result = CliRunner().invoke(main, ["fly", *options, "--quiet", "--json", str(path)])
+    assert result.exit_code == 0, result.output
+    summary = json.loads(path.read_text())
+    assert summary["contacts"] == []
+    assert summary["localization"]["position_error_m"]["p95"] < 0.15

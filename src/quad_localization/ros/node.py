@@ -137,7 +137,9 @@ class AmclNode:
         if frame != wanted:
             self._warn(f"the map is in frame '{excerpt(frame)}', expected '{wanted}'; using it")
         cells = np.array(message.data, np.int8).reshape(info.height, info.width)
-        grid = OccupancyMap.from_occupancy(cells, info.resolution, *place)
+        grid = OccupancyMap.from_occupancy(
+            cells, info.resolution, *place, self._amcl.params.upstream
+        )
         one = self._read(rospy.get_param("~", {}))
         pose = Pose2D(one.initial_pose_x_m, one.initial_pose_y_m, one.initial_pose_a_rad)
         variances = (one.initial_cov_xx, one.initial_cov_yy, one.initial_cov_aa)

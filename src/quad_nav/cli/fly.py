@@ -116,10 +116,11 @@ AIRFRAMES = ("default", "arducopter")
 )
 @click.option(
     "--localization",
-    type=click.Choice(("simulator", "slam")),
+    type=click.Choice(("simulator", "amcl", "slam")),
     default="simulator",
     show_default=True,
-    help="How robots know their places: exactly, or by their LIDARs without a map.",
+    help="How robots know their places: exactly; by LIDAR and the scene's map (amcl); or by LIDAR"
+    " alone (slam).",
 )
 @click.option(
     "--scan-range",

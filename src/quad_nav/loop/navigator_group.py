@@ -236,7 +236,7 @@ class NavigatorGroup:
                 self.localization.add_scan(
                     number,
                     scan,
-                    pose_in(map_from_odom, base).to_2d(),
+                    pose_in(map_from_odom, base),
                     pose_in(map_from_odom, lidar),
                 )
         self._hand_over(scans, now_s, states)

@@ -20,7 +20,7 @@ class Localization(Protocol):
     """Finds the odometry frames of all robots in ``map``."""
 
     def add_scan(
-        self, robot: int, scan: Scan, odom_from_base: Pose2D, odom_from_lidar: Pose3D
+        self, robot: int, scan: Scan, odom_from_base: Pose3D, odom_from_lidar: Pose3D
     ) -> None:
         """Take a scan, with the poses of the robot and of its LIDAR by odometry at its stamp."""
 

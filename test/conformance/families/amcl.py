@@ -37,7 +37,9 @@ def upstream_params(params: Mapping[str, Any]) -> AmclParams:
 
 
 def map_of(arrays: Arrays, meta: Recorded) -> OccupancyMap:
-    return OccupancyMap.from_occupancy(arrays["occupancy"], meta["resolution"], *meta["origin"])
+    return OccupancyMap.from_occupancy(
+        arrays["occupancy"], meta["resolution"], *meta["origin"], upstream=True
+    )
 
 
 def scan_of(meta: Recorded, ranges_m: np.ndarray) -> Scan:
