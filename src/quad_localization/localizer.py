@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from quad_localization.laser import Laser
 from quad_localization.likelihood_field import LikelihoodField, likelihood_field
 from quad_localization.occupancy_map import OccupancyMap
-from quad_localization.odometry_models import angle_difference, move_diff, move_omni
+from quad_localization.odometry_models import angle_difference, moved
 from quad_localization.parameters import BEAM, AmclParams
 from quad_localization.particle_filter import ParticleFilter
 from quad_localization.random_numbers import seeded
@@ -56,7 +56,7 @@ class Update:
     """What a scan did.
 
     Attributes:
-        moved: Whether the particles moved with the odometry.
+        is_moved: Whether the particles moved with the odometry.
         is_weighed: Whether the scan weighed them.
         is_resampled: Whether they were resampled.
         estimate: A new estimate; None between.
@@ -64,7 +64,7 @@ class Update:
         map_from_odom: The latest transform; None before the first estimate.
     """
 
-    moved: bool = False
+    is_moved: bool = False
     is_weighed: bool = False
     is_resampled: bool = False
     estimate: Optional[PoseEstimate] = None
@@ -185,8 +185,8 @@ class Amcl:
         if begins or self._is_update_due(odometry):
             for one in self._lasers.values():
                 one.is_due = True
-        moved = laser.is_due and not begins
-        if moved:
+        is_moved = laser.is_due and not begins
+        if is_moved:
             self._move(odometry)
         is_weighed = is_resampled = False
         shows_cloud = laser.is_due and not self.is_update_requested
@@ -196,7 +196,7 @@ class Amcl:
             self._leave_out_peers(beams, seen)
             is_weighed, is_resampled = self._weigh(laser, beams, odometry)
         estimate = self._estimate(seen) if is_resampled or begins else None
-        return Update(moved, is_weighed, is_resampled, estimate, shows_cloud, self.map_from_odom)
+        return Update(is_moved, is_weighed, is_resampled, estimate, shows_cloud, self.map_from_odom)
 
     def _is_update_due(self, odometry: Pose2D) -> bool:
         """Tell whether the robot has moved enough, or an update was requested."""
@@ -212,14 +212,19 @@ class Amcl:
     def _move(self, odometry: Pose2D) -> None:
         assert self.particles is not None
         one, before = self.params, self._odometry
-        turn_rad = angle_difference(odometry.yaw_rad, before.yaw_rad)
+        turn_rad = float(angle_difference(odometry.yaw_rad, before.yaw_rad))
         delta = (odometry.x_m - before.x_m, odometry.y_m - before.y_m, turn_rad)
-        alphas = (one.odom_alpha1, one.odom_alpha2, one.odom_alpha3, one.odom_alpha4)
-        move = move_diff if one.odom_model_type.startswith("diff") else move_omni
-        is_corrected = one.odom_model_type.endswith("-corrected")
+        alphas = (
+            one.odom_alpha1,
+            one.odom_alpha2,
+            one.odom_alpha3,
+            one.odom_alpha4,
+            one.odom_alpha5,
+        )
         old_yaw_rad = odometry.yaw_rad - turn_rad
-        poses, alphas5 = self.particles.poses, (*alphas, one.odom_alpha5)
-        move(poses, old_yaw_rad, delta, alphas5, is_corrected, self._random)
+        self.particles.poses = moved(
+            one.odom_model_type, alphas, self.particles.poses, old_yaw_rad, delta, self._random
+        )
 
     def _leave_out_peers(self, beams: Beams, seen: Observation) -> None:
         """Take the ranges of beams that end on peers out; the latest transform says where."""

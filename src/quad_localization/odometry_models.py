@@ -1,4 +1,4 @@
-"""Kernels of the odometry models: particles move with the odometry and with noise.
+"""Odometry models: particles move with the odometry and with noise.
 
 ``diff`` turns, drives and turns; ``omni`` moves in any direction. Both take a variance as the
 standard deviation; the corrected models take its root.
@@ -10,100 +10,81 @@ ros-planning/navigation, amcl 1.17.3.
 from __future__ import annotations
 
 import math
-from typing import Tuple
+from typing import Any, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_localization.random_numbers import State, normal
-from quad_nav.files.kernel_cache import njit
+from quad_localization.random_numbers import State, normals
 
 Floats = NDArray[np.float64]
-Alphas = Tuple[float, float, float, float, float]
+Delta = Tuple[float, float, float]
 
-_LEAST_WAY = 0.01  # metres; the bearing of a shorter way is noise
+_LEAST_WAY_M = 0.01  # the bearing of a shorter way is noise
 
 
-@njit(cache=True, nogil=True)
-def angle_difference(a: float, b: float) -> float:
-    """Return a - b by the shorter way, rounded as amcl rounds it."""
-    a, b = math.atan2(math.sin(a), math.cos(a)), math.atan2(math.sin(b), math.cos(b))
+def angle_difference(a: Any, b: Any) -> Any:
+    """Return a - b by the shorter way, of numbers or arrays, rounded as amcl rounds it."""
+    a, b = np.arctan2(np.sin(a), np.cos(a)), np.arctan2(np.sin(b), np.cos(b))
     direct = a - b
-    other = 2 * math.pi - abs(direct)
-    if direct > 0:
-        other = -other
-    return direct if abs(direct) < abs(other) else other
+    other = np.where(direct > 0, -1.0, 1.0) * (2 * math.pi - np.abs(direct))
+    return np.where(np.abs(direct) < np.abs(other), direct, other)
 
 
-@njit(cache=True, nogil=True)
-def move_diff(
-    poses: Floats,
-    old_yaw: float,
-    delta: Tuple[float, float, float],
-    alphas: Alphas,
-    corrected: bool,
-    state: State,
-) -> None:
-    """Move poses by ``diff`` or ``diff-corrected``.
+def moved(
+    model: str, alphas: Sequence[float], poses: Floats, old_yaw: float, delta: Delta, state: State
+) -> Floats:
+    """Return poses float64[m, 3], metres and radians, after a motion.
 
     Args:
-        poses: float64[m, 3], metres and radians, changed.
-        old_yaw: Heading of the odometry before, radians.
-        delta: Change of the odometry in its own frame: x, y in metres, yaw in radians.
+        model: The parameter ``odom_model_type``.
         alphas: The parameters ``odom_alpha1`` to ``odom_alpha5``.
-        corrected: Whether the noise is the root of the variance.
+        poses: Poses before.
+        old_yaw: Heading of the odometry before, radians.
+        delta: Change of the odometry in its frame: x, y in metres, yaw in radians.
         state: Of the random numbers, changed.
     """
-    way = math.sqrt(delta[0] * delta[0] + delta[1] * delta[1])
-    turn1 = 0.0
-    if way >= _LEAST_WAY:
-        turn1 = angle_difference(math.atan2(delta[1], delta[0]), old_yaw)
-    turn2 = angle_difference(delta[2], turn1)
-    # Backward motion has the noise of forward motion.
-    noise1 = min(abs(angle_difference(turn1, 0.0)), abs(angle_difference(turn1, math.pi)))
-    noise2 = min(abs(angle_difference(turn2, 0.0)), abs(angle_difference(turn2, math.pi)))
-    deviation1 = alphas[0] * noise1 * noise1 + alphas[1] * way * way
-    deviation2 = alphas[0] * noise2 * noise2 + alphas[1] * way * way
-    deviation = alphas[2] * way * way + alphas[3] * noise1 * noise1 + alphas[3] * noise2 * noise2
-    if corrected:
-        deviation1, deviation2 = math.sqrt(deviation1), math.sqrt(deviation2)
-        deviation = math.sqrt(deviation)
-    for m in range(len(poses)):
-        turned1 = angle_difference(turn1, normal(state, deviation1))
-        moved = way - normal(state, deviation)
-        turned2 = angle_difference(turn2, normal(state, deviation2))
-        poses[m, 0] += moved * math.cos(poses[m, 2] + turned1)
-        poses[m, 1] += moved * math.sin(poses[m, 2] + turned1)
-        poses[m, 2] += turned1 + turned2
+    way, bearing = math.sqrt(delta[0] * delta[0] + delta[1] * delta[1]), 0.0
+    is_corrected, is_diff = model.endswith("-corrected"), model.startswith("diff")
+    if not is_diff or way >= _LEAST_WAY_M:
+        bearing = float(angle_difference(math.atan2(delta[1], delta[0]), old_yaw))
+    variances = (_diff if is_diff else _omni)(way, bearing, delta[2], alphas, is_corrected)
+    noise = np.sqrt(variances) if is_corrected else np.array(variances)
+    noise = noise * normals(state, 3 * len(poses)).reshape(-1, 3)
+    if not is_diff:
+        cos, sin = np.cos(bearing + poses[:, 2]), np.sin(bearing + poses[:, 2])
+        way_, aside = way + noise[:, 0], noise[:, 2]
+        steps = (way_ * cos + aside * sin, way_ * sin - aside * cos, delta[2] + noise[:, 1])
+        return poses + np.column_stack(steps)
+    turn1 = angle_difference(bearing, noise[:, 0])
+    turn2 = angle_difference(angle_difference(delta[2], bearing), noise[:, 2])
+    way_, yaw = way - noise[:, 1], poses[:, 2] + turn1
+    return poses + np.column_stack((way_ * np.cos(yaw), way_ * np.sin(yaw), turn1 + turn2))
 
 
-@njit(cache=True, nogil=True)
-def move_omni(
-    poses: Floats,
-    old_yaw: float,
-    delta: Tuple[float, float, float],
-    alphas: Alphas,
-    corrected: bool,
-    state: State,
-) -> None:
-    """Move poses by ``omni`` or ``omni-corrected``; arguments as in ``move_diff``.
+def _diff(way: float, turn1: float, turn: float, alphas: Sequence[float], _: bool) -> Delta:
+    """Return the variances of the first turn, the way and the second turn."""
+    noises = []
+    for one in (turn1, angle_difference(turn, turn1)):  # backward motion counts like forward
+        noises.append(min(abs(angle_difference(one, way)) for way in (0.0, math.pi)))
+    squares = [float(one * one) for one in noises]
+    of_way = way * way
+    return (
+        alphas[0] * squares[0] + alphas[1] * of_way,
+        alphas[2] * of_way + alphas[3] * squares[0] + alphas[3] * squares[1],
+        alphas[0] * squares[1] + alphas[1] * of_way,
+    )
 
-    The corrected model also exchanges the roles of alpha1 and alpha4.
+
+def _omni(way: float, _: float, turn: float, alphas: Sequence[float], corrected: bool) -> Delta:
+    """Return the variances of the way, the turn and the way aside.
+
+    The corrected model exchanges the roles of alpha1 and alpha4.
     """
-    way, turn = math.sqrt(delta[0] * delta[0] + delta[1] * delta[1]), delta[2]
-    of_turn, of_way = (alphas[0], alphas[3]) if corrected else (alphas[3], alphas[0])
-    deviation = alphas[2] * (way * way) + of_way * (turn * turn)
-    turn_deviation = of_turn * (turn * turn) + alphas[1] * (way * way)
-    side_deviation = of_way * (turn * turn) + alphas[4] * (way * way)
-    if corrected:
-        deviation, turn_deviation = math.sqrt(deviation), math.sqrt(turn_deviation)
-        side_deviation = math.sqrt(side_deviation)
-    bearing = angle_difference(math.atan2(delta[1], delta[0]), old_yaw)
-    for m in range(len(poses)):
-        cos, sin = math.cos(bearing + poses[m, 2]), math.sin(bearing + poses[m, 2])
-        moved = way + normal(state, deviation)
-        turned = turn + normal(state, turn_deviation)
-        aside = normal(state, side_deviation)
-        poses[m, 0] += moved * cos + aside * sin
-        poses[m, 1] += moved * sin - aside * cos
-        poses[m, 2] += turned
+    own, other = (alphas[0], alphas[3]) if corrected else (alphas[3], alphas[0])
+    of_way, of_turn = way * way, turn * turn
+    return (
+        alphas[2] * of_way + other * of_turn,
+        own * of_turn + alphas[1] * of_way,
+        other * of_turn + alphas[4] * of_way,
+    )

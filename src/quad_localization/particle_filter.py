@@ -16,7 +16,7 @@ from quad_localization.cluster_statistics import ClusterStatistics, cluster_stat
 from quad_localization.covariance_axes import covariance_axes
 from quad_localization.histogram import TURN_CELLS, Histogram, add_pose, add_poses, new_histogram
 from quad_localization.parameters import AmclParams
-from quad_localization.random_numbers import State, normal, uniform
+from quad_localization.random_numbers import State, normals, uniform
 from quad_nav.files.kernel_cache import njit
 
 Floats = NDArray[np.float64]
@@ -53,13 +53,14 @@ class ParticleFilter:
         """Draw particles about a pose float64[3] with a covariance float64[3, 3]."""
         axes, variances = covariance_axes(covariance)
         deviations = np.sqrt(np.maximum(variances, 0.0))  # rounding makes some of them negative
-        count = max(self.params.max_particles, 1)
-        self._begin(_draw_normal(count, mean, axes, deviations, self._state))
+        drawn = normals(self._state, 3 * max(self.params.max_particles, 1)).reshape(-1, 3)
+        self._begin(mean + (drawn * deviations) @ axes.T)
 
     def spread_uniformly(self) -> None:
         """Draw particles all over the free cells."""
-        count = max(self.params.max_particles, 1)
-        self._begin(_draw_uniform(count, self.free_places, self._state))
+        poses = np.empty((max(self.params.max_particles, 1), 3))
+        _draw_poses(poses, self.free_places, self._state)
+        self._begin(poses)
 
     def _begin(self, poses: Floats) -> None:
         self.poses, self.weights = poses, np.full(len(poses), 1.0 / len(poses))
@@ -123,36 +124,12 @@ def are_near(poses: Floats, distance_m: float) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _draw_normal(
-    count: int, mean: Floats, axes: Floats, deviations: Floats, state: State
-) -> Floats:
-    """Draw poses float64[count, 3] about a mean, with deviations along axes."""
-    poses, drawn = np.empty((count, 3)), np.empty(3)
-    for m in range(count):
-        for k in range(3):
-            drawn[k] = normal(state, deviations[k])
-        for i in range(3):
-            poses[m, i] = mean[i]
-            for k in range(3):
-                poses[m, i] += axes[i, k] * drawn[k]
-    return poses
-
-
-@njit(cache=True, nogil=True)
-def _draw_pose(pose: Floats, places: Floats, state: State) -> None:
-    """Draw a pose in the centre of a free cell."""
-    place = places[int(uniform(state) * len(places))]
-    pose[0], pose[1] = place[0], place[1]
-    pose[2] = uniform(state) * 2 * math.pi - math.pi
-
-
-@njit(cache=True, nogil=True)
-def _draw_uniform(count: int, places: Floats, state: State) -> Floats:
-    """Draw poses float64[count, 3] in free cells."""
-    poses = np.empty((count, 3))
-    for m in range(count):
-        _draw_pose(poses[m], places, state)
-    return poses
+def _draw_poses(poses: Floats, places: Floats, state: State) -> None:
+    """Draw poses float64[m, 3] in the centres of free cells."""
+    for m in range(len(poses)):
+        place = places[int(uniform(state) * len(places))]
+        poses[m, 0], poses[m, 1] = place[0], place[1]
+        poses[m, 2] = uniform(state) * 2 * math.pi - math.pi
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -198,12 +175,11 @@ def _draw_by_weight(
     most = max(kld[1], 1)
     drawn = np.empty((most, 3))
     for count in range(1, most + 1):
-        pose = drawn[count - 1]
         if uniform(state) < random_share:
-            _draw_pose(pose, places, state)
+            _draw_poses(drawn[count - 1 : count], places, state)
         else:
             chosen = np.searchsorted(sums, uniform(state), side="right")
-            pose[:] = poses[min(chosen, len(poses) - 1)]  # rounding leaves the sum below 1
-        if count > resample_limit(add_pose(tree, pose), kld):
+            drawn[count - 1] = poses[min(chosen, len(poses) - 1)]  # rounding: the sum is below 1
+        if count > resample_limit(add_pose(tree, drawn[count - 1]), kld):
             break
     return drawn[:count].copy()

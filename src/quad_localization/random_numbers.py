@@ -1,7 +1,6 @@
 """Random numbers of amcl: drand48, and normal numbers made of it.
 
-A state is uint64[1] with the 48 bits of the generator. Equal states give equal particles, on every
-system.
+A state is uint64[1] with the 48 bits of the generator. Equal states give equal particles.
 
 Source: POSIX, ``drand48``; G. Marsaglia, T. Bray, "A Convenient Method for Generating Normal
 Variables", SIAM Review 6, 1964.
@@ -18,8 +17,7 @@ from quad_nav.files.kernel_cache import njit
 
 State = NDArray[np.uint64]
 
-_FACTOR, _SUMMAND = np.uint64(0x5DEECE66D), np.uint64(0xB)
-_MASK = np.uint64(2**48 - 1)
+_FACTOR, _SUMMAND, _MASK = np.uint64(0x5DEECE66D), np.uint64(0xB), np.uint64(2**48 - 1)
 _SCALE = 2.0**-48
 
 
@@ -36,13 +34,11 @@ def uniform(state: State) -> float:
 
 
 @njit(cache=True, nogil=True)
-def normal(state: State, deviation: float) -> float:
-    """Draw a number with mean 0 and a standard deviation, by the polar method.
-
-    The draws are used up even if the deviation is 0.
-    """
-    while True:
-        a, b = 0.0, 0.0
+def normals(state: State, count: int) -> NDArray[np.float64]:
+    """Draw numbers float64[count] with mean 0 and deviation 1, by the polar method."""
+    drawn, k = np.empty(count), 0
+    while k < count:
+        a = b = 0.0
         while a == 0.0:
             a = uniform(state)
         while b == 0.0:
@@ -50,4 +46,6 @@ def normal(state: State, deviation: float) -> float:
         a, b = 2.0 * a - 1.0, 2.0 * b - 1.0
         w = a * a + b * b
         if 0.0 < w <= 1.0:
-            return deviation * b * math.sqrt(-2.0 * math.log(w) / w)
+            drawn[k] = b * math.sqrt(-2.0 * math.log(w) / w)
+            k += 1
+    return drawn

@@ -20,7 +20,7 @@ from quad_localization.occupancy_map import (
     ray_range,
     row_of,
 )
-from quad_localization.odometry_models import angle_difference, move_diff, move_omni
+from quad_localization.odometry_models import angle_difference, moved
 from quad_localization.parameters import BEAM, AmclParams, read_params
 from quad_localization.particle_filter import ParticleFilter, are_near, resample_limit
 from quad_localization.random_numbers import State, seeded, uniform
@@ -129,15 +129,13 @@ def check_motion(path: Path) -> List[Difference]:
     case, comparison = load_case(path), Comparison()
     arrays, meta = case.arrays, case.meta
     params, state = upstream_params(meta["params"]), seeded(meta["seed"])
-    poses = arrays["particles_in"].copy()
     pose, old = arrays["pose"], arrays["old_pose"]
-    turn_rad = angle_difference(pose[2], old[2])
+    turn_rad = float(angle_difference(pose[2], old[2]))
     delta = (*(pose - old)[:2].tolist(), turn_rad)
     comparison.near("delta", delta, arrays["delta"], TOLERANCE)
-    move = move_diff if params.odom_model_type.startswith("diff") else move_omni
     alphas = tuple(meta["params"][f"odom_alpha{k}"] for k in range(1, 6))
     delta = tuple(arrays["delta"].tolist())
-    move(poses, old[2], delta, alphas, params.odom_model_type.endswith("corrected"), state)
+    poses = moved(params.odom_model_type, alphas, arrays["particles_in"], old[2], delta, state)
     comparison.near("particles_out", poses, arrays["particles_out"], TOLERANCE)
     comparison.exact("next_drand48", uniform(state), meta["next_drand48"])
     return comparison.differences

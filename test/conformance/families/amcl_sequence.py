@@ -81,7 +81,7 @@ def _check_update(
 ) -> None:
     sends = params.tf_broadcast and update.map_from_odom is not None
     for name, found in (
-        ("action", update.moved),
+        ("action", update.is_moved),
         ("updated", update.is_weighed),
         ("resampled", update.is_resampled),
         ("pose_published", update.estimate is not None),
