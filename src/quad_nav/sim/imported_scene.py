@@ -17,7 +17,6 @@ from quad_nav.grid import GridSpec
 from quad_nav.sim.map_file import load_map
 from quad_nav.sim.obstacles import Obstacle
 from quad_nav.sim.scene import BODY_RADIUS_M, Floats, MovingObstacle, Scene
-from quad_nav.sim.scene_cells import parts_of, touched_cells
 from quad_nav.sim.world_file import load_world
 
 Extent = Tuple[float, float, float, float]
@@ -142,6 +141,8 @@ class _Ground:
     """Places of an arena where a robot can start, and the parts that it can reach from there."""
 
     def __init__(self, scene: Scene, may_start: MayStart, distance_m: float) -> None:
+        from quad_nav.sim.scene_cells import parts_of, touched_cells  # here: it loads numba
+
         self._scene, self._distance_m = scene, distance_m
         cell_m = max(_CELL_M, math.sqrt(scene.size_x_m * scene.size_y_m / _MAX_CELLS))
         columns, rows = (math.ceil(one / cell_m) for one in (scene.size_x_m, scene.size_y_m))
