@@ -145,8 +145,7 @@ class _Ground:
     """Places of an arena where a robot can start, and the parts that it can reach from there."""
 
     def __init__(self, scene: Scene, may_start: MayStart, distance_m: float) -> None:
-        # Here: scenes that have starts load without numba.
-        from quad_nav.sim.scene_cells import parts_of, touched_cells
+        from quad_nav.sim.scene_cells import parts_of, touched_cells  # here: it loads numba
 
         self._scene, self._distance_m = scene, distance_m
         cell_m = max(_CELL_M, math.sqrt(scene.size_x_m * scene.size_y_m / _MAX_CELLS))

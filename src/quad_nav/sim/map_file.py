@@ -134,6 +134,8 @@ def load_map(document: Any, path: Path) -> OccupancyMap:
         raise InputError(check.problems)
     pixels = read_pixels(fields.image, fields.mode == "trinary")
     remarks = [f"{fields.image}: {pixels.remark}"] if pixels.remark else []
+    if fields.image != path.parent / document["image"]:
+        remarks.append(f"{path}: image: {document['image']} is not here, {fields.image} is used")
     remarks += [
         f"{path}: {key}: ignored, map_server has no such key"
         for key in document
@@ -221,6 +223,9 @@ def _read_fields(check: Checker, document: Any, folder: Path) -> Optional[MapFie
 
 
 def _image_path(check: Checker, folder: Path, image: str) -> Path:
+    beside = folder / Path(image).name  # map_saver writes absolute paths of its machine
+    if Path(image).is_absolute() and not Path(image).exists() and beside.is_file():
+        return beside
     try:
         return referenced_file(folder, image)
     except InputError as error:

@@ -234,6 +234,20 @@ def test_bad_images(tmp_path, pixels, problem):
     assert fault.startswith(problem)
 
 
+def test_the_image_of_another_machine_is_looked_for_beside_the_yaml(tmp_path):
+    path = written(tmp_path, np.full((20, 20), 254))
+    path.write_text(path.read_text().replace("m.pgm", "/home/somebody/maps/m.pgm"))
+    assert load_scene(path).remarks[0] == (
+        f"{path}: image: /home/somebody/maps/m.pgm is not here, {tmp_path / 'm.pgm'} is used"
+    )
+
+
+def test_numbers_are_those_of_map_server_s_parser(tmp_path):
+    fields = written(tmp_path, np.full((20, 20), 254), resolution="5e-1", origin="[-5E0, 2e+0, 0]")
+    scene = load_scene(fields)
+    assert (scene.origin_x_m, scene.origin_y_m, scene.size_x_m) == (-5.0, 2.0, 10.0)
+
+
 def test_keys_that_map_server_ignores_are_remarked(tmp_path):
     path = written(tmp_path, np.full((20, 20), 254), unknown_thresh=0.5)
     assert load_scene(path).remarks[0] == (
