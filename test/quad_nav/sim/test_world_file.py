@@ -364,6 +364,14 @@ def test_a_world_by_itself_is_a_scene(tmp_path):
     )
 
 
+def test_a_single_wall_stands_in_the_open(tmp_path):
+    """The wall is 1 m along x and 2 m along y; there are 2 m of room on each side."""
+    scene = load_scene(written(tmp_path, model(BOX, "5 5 1.5 0 0 0")))
+    assert (scene.origin_x_m, scene.origin_y_m) == (2.5, 2.0)
+    assert (scene.end_x_m, scene.end_y_m) == (7.5, 8.0)
+    assert scene.starts
+
+
 def test_an_empty_world_needs_a_scene_with_a_size(tmp_path):
     path = written(tmp_path)
     with pytest.raises(InputError, match="a.world: size: missing, and the world has no obstacles"):
