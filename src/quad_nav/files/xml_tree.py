@@ -6,6 +6,7 @@ read other files.
 
 from __future__ import annotations
 
+import re
 import xml.sax
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +23,7 @@ from quad_nav.files.user_files import read_bytes
 MAX_BYTES = 32 * 1024 * 1024
 MAX_DEPTH = 100
 MAX_ELEMENTS = 1_000_000
+_DECLARATION = re.compile(rb"<\?xml\s[^<>]*>")
 
 
 @dataclass
@@ -60,8 +62,9 @@ def read_xml(path: Path, max_elements: int = MAX_ELEMENTS) -> Element:
         InputError: The file cannot be read, is not XML, or is too large; with the line.
     """
     builder = _Builder(path, max_elements)
-    # Some files have blanks before the declaration, which most readers accept.
-    content = read_bytes(path, MAX_BYTES).lstrip(b" \t\r\n")
+    content = read_bytes(path, MAX_BYTES)
+    if not content.startswith(b"<?xml"):  # some have blanks or a comment before it
+        content = _DECLARATION.sub(b"", content, count=1)
     try:
         defusedxml.sax.parseString(content, builder, forbid_dtd=True)
     except DefusedXmlException as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Callable, Tuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +21,16 @@ _BYTES_PER_PIXEL = {"1": 7, "L": 6, "LA": 12, "RGB": 10, "RGBA": 12, "I;16": 9, 
 _MOST_BYTES_PER_PIXEL = 13
 """Memory of an image's pixels, sums and occupancy while a map is read, measured."""
 _FORMATS = ("PPM", "PNG")  # PPM includes PGM
+_FORMATS_OF_STAGE = (*_FORMATS, "BMP", "GIF", "JPEG")
+_NAMES = {"PPM": "PGM"}
+_LIGHTEST_DARK = 127
 _AS_SDL_LOADS = {"1": "L", "LA": "RGBA"}
 """Modes of images that map_server's SDL_image loads with other channels."""
 PALETTE_REMARK = (
     "has a palette: its colours are used as they look, but map_server uses their numbers in the "
     "palette; expected a grey image for map_server"
 )
+_Read = TypeVar("_Read")
 
 
 @dataclass(frozen=True)
@@ -56,14 +61,33 @@ def read_pixels(path: Path, alpha_counts: bool) -> Pixels:
     Raises:
         InputError: The file is not a PGM or PNG image, is damaged, or is too large.
     """
+    return _read(path, _FORMATS, lambda image: _pixels(image, alpha_counts))
+
+
+def read_dark(path: Path) -> NDArray[np.bool_]:
+    """Read where an image of Stage is dark, bool[H, W]; row 0 is the lowest.
+
+    As in libstage/stage.cc, the first channel counts alone, up to 127.
+
+    Raises:
+        InputError: As ``read_pixels``.
+    """
+    first = _read(
+        path, _FORMATS_OF_STAGE, lambda image: np.asarray(image.convert("RGB"))[::-1, :, 0]
+    )
+    return first <= _LIGHTEST_DARK
+
+
+def _read(path: Path, formats: Tuple[str, ...], convert: Callable[[Image.Image], _Read]) -> _Read:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # MAX_CELLS is ours
-            with open_file(path, MAX_BYTES) as file, Image.open(file, formats=_FORMATS) as image:
+            with open_file(path, MAX_BYTES) as file, Image.open(file, formats=formats) as image:
                 _check_size(path, image)
-                return _pixels(image, alpha_counts)
+                return convert(image)
     except UnidentifiedImageError:
-        raise InputError([f"{path}: is not a PGM or PNG image"]) from None
+        *most, last = (_NAMES.get(one, one) for one in formats)
+        raise InputError([f"{path}: is not a {', '.join(most)} or {last} image"]) from None
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise InputError([f"{path}: cannot be read: {error}"]) from error
 

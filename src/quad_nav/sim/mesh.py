@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.files.user_files import read_bytes
-from quad_nav.files.xml_tree import read_xml
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.sim.obstacles import Box
-from quad_nav.sim.sdf import FLOOR_M, NotRepresented
 
 Floats = NDArray[np.float64]
 
+FLOOR_M = 1e-3
+"""Height up to which planes and solids count as part of the floor."""
 MAX_BYTES = 64 * 1024 * 1024
 MAX_BOXES = 10_000
 """Boxes of one mesh; one with more details has coarser cells."""
@@ -30,40 +30,76 @@ _MAX_CELLS = 64 * 1024 * 1024
 _THINNEST_M = 0.01
 """Thickness of a flat mesh: a box has a volume."""
 _FORMATS = (".dae", ".stl", ".obj")
+_LFS_POINTER = b"version https://git-lfs"
 _INSTALL = "pip install 'quad-nav[meshes]', in a checkout .venv/bin/pip install trimesh pycollada"
+
+
+class NotRepresented(Exception):
+    """Reason in a few words why a part of a world is left out of the scene."""
 
 
 def read_triangles(path: Path) -> Floats:
     """Return the triangles float64[n, 3, 3] of a mesh file, in m.
 
-    As in Gazebo, the unit of a COLLADA file counts, and its upward axis does not.
-
     Raises:
         InputError: The file cannot be read.
-        NotRepresented: It is no mesh, or trimesh is not installed.
+        NotRepresented: It is no mesh, or the extra is not installed.
     """
     suffix = path.suffix.lower()
     if suffix not in _FORMATS:
         raise NotRepresented(f"mesh that is no {', '.join(_FORMATS)}")
-    if suffix == ".dae":
-        read_xml(path)  # refuses entities, which the reader of meshes would expand
+    content = read_bytes(path, MAX_BYTES)
+    if content.startswith(_LFS_POINTER):
+        raise NotRepresented("mesh of which only Git LFS's pointer is there: git lfs pull")
     try:
-        import trimesh
-
-        if suffix == ".dae":
-            import collada  # noqa: F401
+        triangles = _collada(content) if suffix == ".dae" else _stl_or_obj(content, suffix[1:])
     except ImportError as error:
         raise NotRepresented(f"mesh, which needs {error.name}: {_INSTALL}") from error
-    content = io.BytesIO(read_bytes(path, MAX_BYTES))
-    try:
-        mesh = trimesh.load_scene(content, file_type=suffix[1:], process=False).to_mesh()
-        metres = trimesh.units.unit_conversion(mesh.units or "meters", "meters")
-        triangles = np.asarray(mesh.triangles, float).reshape(-1, 3, 3) * metres
     except Exception as error:  # of any kind: its readers trust their files
         raise NotRepresented(f"mesh that cannot be read: {error}") from error
     if not np.isfinite(triangles).all():
         raise NotRepresented("mesh with coordinates that are no numbers")
     return triangles
+
+
+def _stl_or_obj(content: bytes, file_type: str) -> Floats:
+    import trimesh
+
+    mesh = trimesh.load_mesh(io.BytesIO(content), file_type=file_type, process=False)
+    return np.asarray(mesh.triangles, float).reshape(-1, 3, 3)
+
+
+def _collada(content: bytes) -> Floats:
+    """Read a COLLADA file; as in Gazebo, its unit counts, and its upward axis does not."""
+    import collada
+
+    if b"<!DOCTYPE" in content or b"<COLLADA" not in content:  # the reader expands entities
+        raise ValueError("expected <COLLADA> without a DOCTYPE")
+    file = collada.Collada(io.BytesIO(content), ignore=[collada.common.DaeError])
+    parts = [np.zeros((0, 3, 3))]
+    for geometry in file.scene.objects("geometry"):
+        for primitive in geometry.primitives():
+            if isinstance(primitive, collada.polylist.BoundPolylist):
+                primitive = primitive.triangleset()
+            if isinstance(primitive, collada.triangleset.BoundTriangleSet) and len(primitive):
+                parts.append(primitive.vertex[primitive.vertex_index])
+    return np.concatenate(parts).astype(float) * (file.assetInfo.unitmeter or 1.0)
+
+
+def prism(outline: Floats, is_closed: bool = True) -> Floats:
+    """Return the triangles float64[n, 3, 3] of an upright prism from z = -0.5 to 0.5.
+
+    Args:
+        outline: Corners float64[k, 2]; convex, if the prism is closed above and below.
+        is_closed: It has a top and a bottom.
+    """
+    here = np.insert(outline, 2, -0.5, axis=1)
+    after, up = np.roll(here, -1, axis=0), (0.0, 0.0, 1.0)
+    triangles = [(here, after, after + up), (here, after + up, here + up)]
+    if is_closed:
+        middle = np.broadcast_to(here.mean(axis=0), here.shape)
+        triangles += [(here, after, middle), (here + up, after + up, middle + up)]
+    return np.concatenate([np.stack(corners, axis=1) for corners in triangles])
 
 
 def boxes_of(name: str, triangles: Floats, pose: Pose3D) -> List[Box]:

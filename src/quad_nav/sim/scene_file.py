@@ -68,6 +68,8 @@ _KEYS = [
     *MOTION_KEYS,
 ]
 _WORLD_SUFFIXES = (".world", ".sdf")
+_ROOM_M = 2.0
+"""Room on each side of a world that is too narrow to be a room itself: a table, or a single wall."""
 MAX_SIZE_M = 1e5
 MAX_STARTS = 1000
 
@@ -208,7 +210,9 @@ def _read_arena(
             check.fault("size", "; ".join((problem, *imported.remarks, expected)))
             return unknown
         x, y, end_x, end_y = imported.extent
-        return (x, y), (end_x - x, end_y - y)
+        is_narrow = "world" in fields and min(end_x - x, end_y - y) < 2 * _ROOM_M
+        room = _ROOM_M if is_narrow else 0.0
+        return (x - room, y - room), (end_x - x + 2 * room, end_y - y + 2 * room)
     size = check.numbers(fields, "size", "", 2, positive=True)
     if max(size) > MAX_SIZE_M:
         check.fault("size", f"{max(size):g} m, expected {MAX_SIZE_M:g} m at most")

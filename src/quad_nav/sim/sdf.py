@@ -11,13 +11,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Dict, List, Optional, Tuple, Union
+from typing import Dict, List, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.files.xml_tree import Element
 from quad_nav.geometry import Pose3D, quaternion_from_euler
+from quad_nav.sim.mesh import FLOOR_M, NotRepresented, boxes_of, prism
 from quad_nav.sim.motion import SPLINE, Motion, Walkers
 from quad_nav.sim.obstacles import Box, Cylinder, Obstacle, Sphere
 from quad_nav.sim.scene import MovingObstacle
@@ -26,16 +27,11 @@ MAX_LENGTH_M = 1e5
 IDENTITY = Pose3D(0.0, 0.0, 0.0)
 UPRIGHT_RAD = 1e-3
 """Tilt up to which an axis counts as vertical: saved worlds have numerical errors."""
-FLOOR_M = 1e-3
-"""Height up to which planes and solids count as part of the floor."""
 PERSON_RADIUS_M, PERSON_HEIGHT_M = Walkers(1).radius_m, Walkers(1).height_m
 MAX_WAYPOINTS = 10_000
 _MAX_TIME_S = 1e5
 _TRUE = ("true", "1")
-
-
-class NotRepresented(Exception):
-    """Reason in a few words why an element is left out of the scene."""
+_SQUARE = np.array([(0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)])
 
 
 @dataclass(frozen=True)
@@ -104,10 +100,12 @@ def is_true(text: str) -> bool:
     return text.strip().lower() in _TRUE
 
 
-def obstacle_of(
+def obstacles_of(
     reader: SdfReader, geometry: Element, name: str, map_from_shape: Pose3D
-) -> Optional[Obstacle]:
-    """Convert a collision's ``<geometry>`` to an obstacle; None if it is the floor.
+) -> Sequence[Obstacle]:
+    """Convert a collision's ``<geometry>`` to obstacles, none if it is the floor.
+
+    A tilted box or cylinder is treated as a mesh.
 
     Raises:
         NotRepresented: It has a fault, or no obstacle has this shape or pose.
@@ -117,13 +115,13 @@ def obstacle_of(
     shape = geometry.children[0]
     makers = {"box": _box, "cylinder": _cylinder, "sphere": _sphere, "plane": _plane}
     if shape.tag == "empty":
-        return None
+        return []
     if shape.tag not in makers:
         raise NotRepresented(shape.tag)
-    obstacle = makers[shape.tag](reader, shape, name, map_from_shape)
-    if obstacle is not None and obstacle.top_m <= FLOOR_M:
+    obstacles = makers[shape.tag](reader, shape, name, map_from_shape)
+    if any(one.top_m <= FLOOR_M for one in obstacles):
         raise NotRepresented("nothing above the floor")
-    return obstacle
+    return obstacles
 
 
 def _above_floor(height_m: float, middle_m: float) -> Tuple[float, float]:
@@ -133,38 +131,40 @@ def _above_floor(height_m: float, middle_m: float) -> Tuple[float, float]:
     return height_m - sunk_m, bottom_m + sunk_m
 
 
-def _box(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle:
+def _box(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Sequence[Obstacle]:
     """Convert a box, which may lie on any of its sides."""
     sizes = reader.lengths(shape, "size", 3, "three numbers of metres")
     rotation = pose.rotation
     up = [axis for axis in range(3) if _tilt_rad(rotation[:, axis]) <= UPRIGHT_RAD]
     if not up:
-        raise NotRepresented("tilted box")
+        return boxes_of(name, prism(_SQUARE) * sizes, pose)
     along, across = (up[0] + 1) % 3, (up[0] + 2) % 3
     yaw_rad = math.atan2(rotation[1, along], rotation[0, along])
     height_m, bottom_m = _above_floor(sizes[up[0]], pose.z_m)
     place = (pose.x_m, pose.y_m)
-    return Box(name, *place, sizes[along], sizes[across], height_m, yaw_rad, bottom_m)
+    return [Box(name, *place, sizes[along], sizes[across], height_m, yaw_rad, bottom_m)]
 
 
-def _cylinder(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle:
+def _cylinder(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Sequence[Obstacle]:
     radius_m, length_m = reader.length(shape, "radius"), reader.length(shape, "length")
     if _tilt_rad(pose.rotation[:, 2]) > UPRIGHT_RAD:
-        raise NotRepresented("tilted cylinder")
-    return Cylinder(name, pose.x_m, pose.y_m, radius_m, *_above_floor(length_m, pose.z_m))
+        outline = Cylinder(name, 0.0, 0.0, radius_m, length_m).corners_m()
+        return boxes_of(name, prism(outline) * (1.0, 1.0, length_m), pose)
+    return [Cylinder(name, pose.x_m, pose.y_m, radius_m, *_above_floor(length_m, pose.z_m))]
 
 
-def _sphere(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle:
-    return Sphere(name, pose.x_m, pose.y_m, pose.z_m, reader.length(shape, "radius"))
+def _sphere(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Sequence[Obstacle]:
+    return [Sphere(name, pose.x_m, pose.y_m, pose.z_m, reader.length(shape, "radius"))]
 
 
-def _plane(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> None:
+def _plane(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Sequence[Obstacle]:
     """Check that a plane is the floor: horizontal, at z = 0 and with its normal upwards."""
     element = shape.first("normal")
     given = reader.numbers(element, 3, "three numbers") if element else None
     normal = pose.rotation @ (given or (0.0, 0.0, 1.0))
     if _tilt_rad(normal) > UPRIGHT_RAD or normal[2] <= 0.0 or abs(pose.z_m) > FLOOR_M:
         raise NotRepresented("plane that is not the floor")
+    return []
 
 
 def _tilt_rad(axis: NDArray[np.float64]) -> float:

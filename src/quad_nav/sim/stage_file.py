@@ -17,8 +17,9 @@ from typing import Dict, Iterator, List, NamedTuple, Sequence, Tuple
 
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import read_bytes
+from quad_nav.sim.mesh import NotRepresented
 from quad_nav.sim.model_files import find_file
-from quad_nav.sim.sdf import MAX_LENGTH_M, NotRepresented
+from quad_nav.sim.sdf import MAX_LENGTH_M
 
 MAX_BYTES = 4 * 1024 * 1024
 MAX_ENTITIES = 20_000

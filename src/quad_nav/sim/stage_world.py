@@ -3,7 +3,7 @@
 Models become obstacles from their bitmaps, blocks or sizes; robots (``position``) and their devices
 do not. Stage's robots drive in a plane, so a world counts as a map: all heights are those of walls.
 Bitmaps and blocks are scaled to their model's size, without the white around a bitmap, as in
-libstage/blockgroup.cc; pixels up to 127 are occupied, as in libstage/stage.cc.
+libstage/blockgroup.cc.
 """
 
 from __future__ import annotations
@@ -18,15 +18,13 @@ import numpy as np
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.map_file import MAX_BOXES, rectangles_of
-from quad_nav.sim.map_image import read_pixels
-from quad_nav.sim.mesh import Floats, boxes_of
+from quad_nav.sim.map_image import read_dark
+from quad_nav.sim.mesh import Floats, NotRepresented, boxes_of, prism
 from quad_nav.sim.model_files import find_file, model_folders
 from quad_nav.sim.obstacles import Box
-from quad_nav.sim.sdf import NotRepresented
 from quad_nav.sim.stage_file import Entity, StageReader
 from quad_nav.sim.world_file import Findings, World, listed, printable
 
-_LIGHTEST_OCCUPIED = 127
 _SIZE = (0.1, 0.1, 0.1)
 _THINNEST_M = 0.01
 _ABOVE_ROBOTS_M = 0.5
@@ -147,8 +145,7 @@ class _Walk:
         place = find_file(file, self.folders)
         if place is None:
             raise NotRepresented(f"bitmap {file} that is not found")
-        pixels = read_pixels(place, False)
-        dark = (pixels.sums <= _LIGHTEST_OCCUPIED * pixels.channels)[::-1]
+        dark = read_dark(place)
         rows, columns = (np.flatnonzero(dark.any(axis=axis)) for axis in (1, 0))
         if len(rows) == 0:
             raise NotRepresented(f"bitmap {file} without dark pixels")
@@ -191,13 +188,5 @@ def _sides(blocks: Sequence[Entity]) -> Floats:
         outlines.append(np.array(corners))
     points = np.concatenate(outlines)
     low, high = points.min(axis=0), points.max(axis=0)
-    extent = np.maximum(high - low, 1e-9)
-    triangles = []
-    for outline in outlines:
-        here = np.insert((outline - low) / extent - 0.5, 2, 0.0, axis=1)
-        after, up = np.roll(here, -1, axis=0), (0.0, 0.0, 1.0)
-        triangles += [
-            np.stack([here, after, after + up], 1),
-            np.stack([here, after + up, here + up], 1),
-        ]
-    return np.concatenate(triangles)
+    shares = [(one - low) / np.maximum(high - low, 1e-9) - 0.5 for one in outlines]
+    return np.concatenate([prism(one, is_closed=False) for one in shares]) + (0.0, 0.0, 0.5)

@@ -16,17 +16,16 @@ from typing import Dict, Iterator, List, Optional, Sequence, Tuple
 from quad_nav.errors import InputError
 from quad_nav.files.xml_tree import Element, read_xml
 from quad_nav.geometry import Pose3D
-from quad_nav.sim.mesh import Floats, boxes_of, read_triangles
+from quad_nav.sim.mesh import Floats, NotRepresented, boxes_of, read_triangles
 from quad_nav.sim.model_files import find_file, find_map, find_model, model_folders
 from quad_nav.sim.obstacles import Box, Obstacle
 from quad_nav.sim.scene import MovingObstacle
 from quad_nav.sim.sdf import (
     IDENTITY,
-    NotRepresented,
     SdfReader,
     actor_of,
     is_true,
-    obstacle_of,
+    obstacles_of,
 )
 
 MAX_OBSTACLES = 100_000
@@ -260,9 +259,8 @@ class _Walk:
             if mesh is not None:
                 self.findings.obstacles += self._mesh(mesh, name, map_from_shape)
                 return
-            obstacle = obstacle_of(self.reader, geometry, name, map_from_shape)
-            if obstacle is not None:
-                self.findings.obstacles.append(obstacle)
+            found = obstacles_of(self.reader, geometry, name, map_from_shape)
+            self.findings.obstacles += found
 
     def _mesh(self, mesh: Element, name: str, map_from_mesh: Pose3D) -> List[Box]:
         if mesh.first("submesh") is not None:

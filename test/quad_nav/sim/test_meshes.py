@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 
 import numpy as np
@@ -63,13 +64,16 @@ def world_of(folder, uri="box.stl", pose="0 0 0 0 0 0", scale=""):
     return path
 
 
-def extent(path):
-    """Lowest and highest x, y and z of a world's boxes."""
-    boxes = load_world(path).obstacles
+def assert_world_extent(path, expected):
+    """Compare lowest and highest x, y and z of a world's boxes."""
+    assert_extent(load_world(path).obstacles, expected)
+
+
+def assert_extent(boxes, expected):
     outlines = np.concatenate([one.outline_m() for one in boxes])
     low, high = outlines.min(axis=0).tolist(), outlines.max(axis=0).tolist()
     heights = min(one.bottom_m for one in boxes), max(one.top_m for one in boxes)
-    return [*zip(low, high), heights]
+    np.testing.assert_allclose([*zip(low, high), heights], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("name, content", [("a.stl", stl()), ("a.OBJ", obj()), ("a.dae", dae())])
@@ -78,15 +82,37 @@ def test_a_mesh_of_each_format_has_its_pose_and_scale(tmp_path, name, content):
     (tmp_path / name).write_text(content)
     scale = "<scale>2 1 2</scale>"
     path = world_of(tmp_path, name, "5 6 0.5 0 0 1.5707963267948966", scale)
-    expected = [(4.0, 6.0), (4.0, 8.0), (0.5, 2.5)]
-    np.testing.assert_allclose(extent(path), expected, atol=1e-9)
+    assert_world_extent(path, [(4.0, 6.0), (4.0, 8.0), (0.5, 2.5)])
 
 
 def test_a_tilted_mesh_and_the_part_above_the_floor(tmp_path):
     """Lying on its side it is 1 m along x; 0.6 m of its 2 m are below the floor."""
     (tmp_path / "box.stl").write_text(stl())
     path = world_of(tmp_path, pose="0 0 0.4 0 1.5707963267948966 0")
-    np.testing.assert_allclose(extent(path), [(0.0, 1.0), (-1.0, 1.0), (0.0, 1.4)], atol=1e-9)
+    assert_world_extent(path, [(0.0, 1.0), (-1.0, 1.0), (0.0, 1.4)])
+
+
+def test_tilted_boxes_and_cylinders_are_surfaces_too(tmp_path):
+    """A ramp of 4 x 1 x 0.2 m at 30 degrees, and a cylinder of 2 m that lies along y."""
+    path = tmp_path / "a.world"
+    path.write_text(
+        '<sdf><model name="m"><static>1</static><link name="l"><collision name="ramp">'
+        "<pose>0 0 1.5 0 0.5235987755982988 0</pose><geometry><box><size>4 1 0.2</size></box>"
+        '</geometry></collision></link><link name="k"><pose>9 0 1 1.5707963267948966 0 0</pose>'
+        '<collision name="c"><geometry><cylinder><radius>0.5</radius><length>2</length></cylinder>'
+        "</geometry></collision></link></model></sdf>"
+    )
+    world = load_world(path)
+    ramp = [box for box in world.obstacles if box.name.startswith("m/l/ramp")]
+    log = [box for box in world.obstacles if box.name.startswith("m/k/c")]
+    reach_m = 2 * math.cos(math.pi / 6) + 0.1 * math.sin(math.pi / 6)
+    rise_m = 2 * math.sin(math.pi / 6) + 0.1 * math.cos(math.pi / 6)
+    assert_extent(ramp, [(-reach_m, reach_m), (-0.5, 0.5), (1.5 - rise_m, 1.5 + rise_m)])
+    assert_extent(log, [(8.5, 9.5), (-1.0, 1.0), (0.5, 1.5)])
+    assert world.remarks == ()
+    # The ramp descends along x: at x = 1 its middle is at 1.5 - tan(30 degrees) m.
+    distances = [min(box.surface_distance_m(1.0, 0.0, z) for box in ramp) for z in (0.92, 1.5)]
+    assert distances[0] <= 0.1 and distances[1] > 0.3
 
 
 def test_a_room_of_one_mesh_is_a_room(tmp_path):
@@ -133,8 +159,9 @@ def test_meshes_are_found_as_gazebo_finds_them(tmp_path, monkeypatch, uri, place
     [
         ("a.dae", "<a/>", "mesh that cannot be read: "),
         ("a.ply", "ply", "mesh that is no .dae, .stl, .obj: m/l/c"),
-        ("a.dae", '<!DOCTYPE a [<!ENTITY b "c">]><a/>', "DOCTYPE and entities are refused"),
+        ("a.dae", '<!DOCTYPE a [<!ENTITY b "c">]><a/>', "expected <COLLADA> without a DOCTYPE"),
         ("a.stl", stl(bottom=-1.0), "nothing above the floor: m/l/c"),
+        ("a.stl", "version https://git-lfs.github.com/spec/v1\n", "pointer is there: git lfs pull"),
         ("a.obj", obj().replace("v 1 1 1", "v 1 1 nan"), "no numbers"),
     ],
 )

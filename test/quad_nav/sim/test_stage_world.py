@@ -137,6 +137,7 @@ def test_a_boundary_is_four_thin_walls(tmp_path):
         ("r2d2 (pose [0 0 0 0])", "1 left out, r2d2, a type that no file defines: r2d2"),
         ('include "no.inc"', "1 left out, <include> that is not found: no.inc"),
         ('plan (bitmap "no.png")', "1 left out, bitmap no.png that is not found: plan"),
+        ('plan (bitmap "a.world")', "a.world: is not a PGM, PNG, BMP, GIF or JPEG image: plan"),
         ('plan (bitmap "white.png")', "1 left out, bitmap white.png without dark pixels: plan"),
         ("model (\nsize [1 x ])", "a.world: line 2: 'x', expected"),
         ('model (size ["a" 1])', "line 1: size: 'a 1', expected numbers up to 100000: model"),
@@ -181,8 +182,8 @@ def test_a_world_of_stage_is_known_by_its_contents(tmp_path):
     """The bitmap is one folder up, as in ROS packages; walls of the scene are 2 m high."""
     (tmp_path / "maps").mkdir()
     (tmp_path / "worlds").mkdir()
-    bitmap(tmp_path / "maps", "###", "#.#", "###")
-    text = '# Stage\nfloorplan (size [9 9 0.5] bitmap "../maps/a.png")'
+    bitmap(tmp_path / "maps", "###", "#.#", "###", name="a.bmp")
+    text = '# Stage\nfloorplan (size [9 9 0.5] bitmap "../maps/a.bmp")'
     scene = load_scene(world_of(tmp_path / "worlds", text))
     assert (scene.origin_x_m, scene.end_y_m) == (-4.5, 4.5)
     assert scene.surface_distance_m(0.0, 0.0, 1.0) == pytest.approx(1.5)

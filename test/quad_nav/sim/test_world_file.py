@@ -204,8 +204,6 @@ def test_ground_plane_and_sun_are_floor_and_light(tmp_path):
 @pytest.mark.parametrize(
     "content, remark",
     [
-        (model(BOX, "0 0 2 0.1 0 0"), "1 left out, tilted box: m/l/c"),
-        (model(CYLINDER, "0 0 2 0 1.5 0"), "1 left out, tilted cylinder: m/l/c"),
         (model("<mesh><uri>a.dae</uri></mesh>"), f"1 left out, mesh {LOST}: m/l/c"),
         (model("<a/>") + model("<a/>", name="n"), "2 left out, a: m/l/c, n/l/c"),
         (model("<plane/>", "0 0 1 0 0 0"), "1 left out, plane that is not the floor: m/l/c"),
@@ -336,9 +334,10 @@ def test_a_world_of_meshes_says_what_was_left_out():
         load_scene(CASES / "meshes_only" / "room.world")
 
 
-def test_blanks_before_the_declaration(tmp_path):
+@pytest.mark.parametrize("before", ["\n ", "<!-- licence -->\n"])
+def test_what_stands_before_the_declaration(tmp_path, before):
     path = written(tmp_path, model(SPHERE))
-    path.write_text(f'\n <?xml version="1.0"?>{path.read_text()}')
+    path.write_text(f'{before}<?xml version="1.0"?>{path.read_text()}')
     assert len(load_world(path).obstacles) == 1
 
 
@@ -363,6 +362,14 @@ def test_a_world_by_itself_is_a_scene(tmp_path):
     assert scene.remarks[0].startswith(
         f"{path}: starts: not given, quadcopters start at [0.25, 1.00], "
     )
+
+
+def test_a_single_wall_stands_in_the_open(tmp_path):
+    """The wall is 1 m along x and 2 m along y; there are 2 m of room on each side."""
+    scene = load_scene(written(tmp_path, model(BOX, "5 5 1.5 0 0 0")))
+    assert (scene.origin_x_m, scene.origin_y_m) == (2.5, 2.0)
+    assert (scene.end_x_m, scene.end_y_m) == (7.5, 8.0)
+    assert scene.starts
 
 
 def test_an_empty_world_needs_a_scene_with_a_size(tmp_path):
