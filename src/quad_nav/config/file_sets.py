@@ -5,7 +5,8 @@ has files of its own. Other folders have other file names, a file for each of se
 maps, and folders of changes below a common one. Their files are classified by name and content.
 Files of the same kind in one folder that set the same parameters are alternatives: each set has one
 of them. ``planner_slow.yaml`` beside ``planner.yaml`` changes it and is loaded after it. A folder's
-files are loaded after those of the folders above it.
+files are loaded after those of the folders above it. Folders without costmaps, such as
+``planners`` beside ``costmaps``, are parts of one set.
 """
 
 from __future__ import annotations
@@ -47,6 +48,8 @@ _OF_COSTMAP = {
     )
     for parameter in table.parameters
 } | {"plugins", "map_type", "static_map"}
+# Names of our parameters that files of other nodes have, too: robot_localization's for instance.
+_OF_OTHERS = {"sensor_timeout", "robot", "robots"}
 # Parameters that only costmaps have.
 _OF_COSTMAP_ONLY = {
     "plugins",
@@ -138,10 +141,33 @@ def file_sets(
         inherited = next((above[parent] for parent in folder.parents if parent in above), [])
         if known:
             above[folder] = inherited + known
-    for folder, files in above.items():
-        if not any(folder in other.parents for other in above):
-            sets += _sets_of(folder, files, number)
+    for folder, files in _joined(above).items():
+        sets += _sets_of(folder, files, number)
     return sorted(sets, key=lambda one: (str(one.folder), one.name)), left
+
+
+def _joined(above: Mapping[Path, List[_KnownFile]]) -> Dict[Path, List[_KnownFile]]:
+    """Return the files of each set's folder; those without costmaps join the nearest with them."""
+    found = {
+        folder: files
+        for folder, files in above.items()
+        if not any(folder in other.parents for other in above)
+    }
+    for folder in list(found):
+        if folder not in found or _has_costmap(found[folder]):
+            continue
+        for parent in folder.parents:
+            beside = [one for one in found if parent in one.parents]
+            if any(_has_costmap(found[one]) for one in beside):
+                files = [file for one in beside for file in found.pop(one)]
+                found[parent] = list({file.file.path: file for file in files}.values())
+                break
+    return found
+
+
+def _has_costmap(files: Sequence[_KnownFile]) -> bool:
+    paths = (path for one in files for path in one.leaves)
+    return any(one.kind[1] for one in files) or any(path.startswith(COSTMAPS) for path in paths)
 
 
 def _folders(top: Path, only: Optional[Path]) -> List[Tuple[Path, List[Path]]]:
@@ -227,7 +253,7 @@ def _placed(path: Path, number: str) -> Optional[_KnownFile]:
     if costmaps:
         meant = costmaps if keys == set(costmaps) else ()
         return replace(_known_file(path, meant, keys, found), file=PlacedFile(path, ("",)))
-    if not named and not keys & _OF_NODE:
+    if not named and not (keys & _OF_NODE - _OF_OTHERS or keys <= _OF_NODE):
         if not keys & (_OF_COSTMAP if "costmap" in path.stem else _OF_COSTMAP_ONLY):
             return None
         named = _costmaps_meant(tree)

@@ -124,8 +124,27 @@ RATE = "controller_frequency: 5.0"
                 "two": ["costmap_common.yaml", "costmap_local.yaml", "two/move_base.yaml"],
             },
         ),
+        (  # folders with parts are one set
+            {
+                "nav/costmaps/costmap_common.yaml": RADIUS,
+                "nav/costmaps/local.yaml": "local_costmap: {width: 3.0}",
+                "nav/planners/dwa/dwa.yaml": PLANNER,
+                "nav/planners/slow/other.yaml": "TrajectoryPlannerROS: {max_vel_x: 0.3}",
+                "nav/move_base.yaml": RATE,
+                "ekf/ekf.yaml": "sensor_timeout: 0.2\nfrequency: 30",
+            },
+            {
+                "nav": [
+                    "nav/costmaps/costmap_common.yaml",
+                    "nav/costmaps/local.yaml",
+                    "nav/planners/dwa/dwa.yaml",
+                    "nav/planners/slow/other.yaml",
+                    "nav/move_base.yaml",
+                ],
+            },
+        ),
     ],
-    ids=["alternatives", "words", "numbers", "folders"],
+    ids=["alternatives", "words", "numbers", "folders", "parts"],
 )
 def test_sets_of_other_folders(tmp_path, texts, expected):
     assert sets(write(tmp_path, texts)) == expected
