@@ -27,7 +27,7 @@ from quad_localization.parameters import AmclParams, read_params
 from quad_localization.ros.peers import PeerPlaces
 from quad_localization.scan_beams import tilted_yaw
 from quad_localization.warm_up import warm_up_amcl
-from quad_nav.errors import excerpt
+from quad_nav.errors import InputError, excerpt
 from quad_nav.files.kernel_cache import COMPILING, announced
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.parameter import parameters_of
@@ -43,6 +43,7 @@ from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.ros.navigator.reconfigure import ParameterServer, config_type
 from quad_nav.ros.navigator.robot_identity import number_in
+from quad_nav.sim.scene_file import load_scene
 from quad_nav.topics.health import Health, Level
 from quad_nav.topics.validation import grid_problem, pose_problem, scan_problem, stamp_problem
 
@@ -141,12 +142,25 @@ class AmclNode:
             cells, info.resolution, *place, self._amcl.params.upstream
         )
         one = self._read(rospy.get_param("~", {}))
-        pose = Pose2D(one.initial_pose_x_m, one.initial_pose_y_m, one.initial_pose_a_rad)
+        pose = self._start(one)
         variances = (one.initial_cov_xx, one.initial_cov_yy, one.initial_cov_aa)
         with self._lock:
             self._amcl.set_map(grid, PoseEstimate(pose, np.diag(variances)))
         rospy.loginfo("%s: map of %d x %d cells", self._name, info.width, info.height)
         return True
+
+    def _start(self, params: AmclParams) -> Pose2D:
+        """Return the initial pose: that of the parameters, or of the scene that they name."""
+        given = Pose2D(params.initial_pose_x_m, params.initial_pose_y_m, params.initial_pose_a_rad)
+        if not params.scene:
+            return given
+        try:
+            starts = load_scene(params.scene).starts
+        except InputError as error:
+            self._warn(f"scene: {error}; the initial pose is that of the parameters")
+            return given
+        robot = params.robot if params.robot >= 0 else number_in(params.base_frame_id) or 0
+        return starts[robot] if robot < len(starts) else given
 
     def _on_set_map(self, request: SetMapRequest) -> SetMapResponse:
         with self._lock:

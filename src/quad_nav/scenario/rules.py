@@ -25,8 +25,8 @@ MAX_SIZE_M = 250  # a larger random arena takes minutes to fill with obstacles
 MAX_ROBOTS = 100
 """Each has costmaps of its own: a thousand need more memory than most machines have."""
 SIMULATOR = "simulator"
-LOCALIZATIONS = (SIMULATOR, "slam", "none")
-"""Who publishes ``map -> odom{i}``: the simulator, our node ``slam``, or somebody else."""
+LOCALIZATIONS = (SIMULATOR, "amcl", "slam", "none")
+"""Who publishes ``map -> odom{i}``: the simulator, our nodes, or somebody else."""
 MAX_SEED = 2**63 - 1
 """Recordings hold the seed as an int64."""
 

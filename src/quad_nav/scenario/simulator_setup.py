@@ -162,7 +162,7 @@ def _host_faults(values: Mapping[str, Any], name: str) -> List[str]:
     if count and values["localization"] != SIMULATOR:
         # They have their poses from the simulation.
         return [
-            f"{name}: localization {values['localization']} with composed, expected separate nodes"
+            f"{name}: localization {values['localization']} with composed, expected composed:=false"
         ]
     if not count or values["hosts"] <= count:
         return []
