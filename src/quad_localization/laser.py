@@ -8,7 +8,7 @@ from typing import Optional, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_localization.laser_models import BeamMixture, Sight, end_cells, ray_factors
+from quad_localization.laser_models import Mixture, end_cells, ray_factors
 from quad_localization.likelihood_field import LikelihoodField
 from quad_localization.occupancy_map import OccupancyMap
 from quad_localization.parameters import BEAM, LIKELIHOOD_FIELD_PROB, AmclParams
@@ -51,11 +51,13 @@ class Laser:
         if params.laser_model_type == BEAM:
             # A NaN makes all weights equal in upstream.
             is_used = np.full(len(ranges_m), params.upstream) | ~np.isnan(ranges_m)
-        sight = Sight(*self._mount, ranges_m[is_used], bearings_rad[is_used], beams.range_max_m)
-        if params.laser_model_type == BEAM:
-            return ray_factors(poses, sight, self._grid.states, self._grid.frame, self._mixture)
-        assert self._field is not None
-        cells = end_cells(poses, sight, self._grid.frame)
+        lasers, frame = _transformed(poses, self._mount), self._grid.frame
+        used_m, used_rad = ranges_m[is_used], bearings_rad[is_used]
+        if self._field is None:
+            states, largest_m = self._grid.states, beams.range_max_m
+            mixture = self._mixture
+            return ray_factors(lasers, used_m, used_rad, largest_m, states, frame, mixture)
+        cells = end_cells(lasers, used_m, used_rad, frame)
         likelihoods = self._field.hits[cells] + params.laser_z_rand * (1.0 / beams.range_max_m)
         if params.laser_model_type == LIKELIHOOD_FIELD_PROB:
             if params.do_beamskip and is_converged:
@@ -66,9 +68,9 @@ class Laser:
         return 1.0 + (likelihoods * likelihoods * likelihoods).sum(axis=1)
 
     @property
-    def _mixture(self) -> BeamMixture:
+    def _mixture(self) -> Mixture:
         one = self._params
-        return BeamMixture(
+        return (
             one.laser_z_hit,
             one.laser_z_short,
             one.laser_z_max,
@@ -103,3 +105,11 @@ class Laser:
         if skipped >= len(counts) * params.beam_skip_error_threshold:
             return likelihoods  # the filter may have converged to a wrong pose
         return likelihoods[:, counts]
+
+
+def _transformed(poses: Floats, mount: Tuple[float, float]) -> Floats:
+    """Return the poses float64[m, 3] of a laser that is mounted at a place of the base."""
+    cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    x = poses[:, 0] + mount[0] * cos - mount[1] * sin
+    y = poses[:, 1] + mount[0] * sin + mount[1] * cos
+    return np.column_stack((x, y, np.arctan2(sin, cos)))

@@ -103,11 +103,11 @@ class Amcl:
     def set_map(self, grid: OccupancyMap, initial: PoseEstimate) -> None:
         """Take a map, and begin at a pose, or at the one that was given before.
 
-        A further map leaves a robot that is localised where it is; upstream begins anew.
+        A further map leaves the particles where they are; upstream begins anew.
         """
         self._grid = grid
         self._make_sensors()
-        if self.particles is not None and self.estimate is not None and not self.params.upstream:
+        if self.particles is not None and not self.params.upstream:
             self.particles.free_places = grid.free_places
             return
         self.particles = ParticleFilter(self.params, grid.free_places, self._random)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,15 +21,7 @@ _LONGEST_RAY_CELLS = 1e7  # farther than any map reaches; keeps an infinite rang
 
 
 class MapFrame(NamedTuple):
-    """Place of a map, for kernels.
-
-    Attributes:
-        size_x: Columns.
-        size_y: Rows.
-        resolution: Size of a cell, metres.
-        centre_x: Centre of the cell ``(size_x // 2, size_y // 2)``, metres.
-        centre_y: The same in y.
-    """
+    """Columns, rows, size of a cell and centre of cell ``(size_x // 2, size_y // 2)``, metres."""
 
     size_x: int
     size_y: int
@@ -73,24 +65,16 @@ class OccupancyMap:
         states = np.full(occupancy.shape, UNKNOWN, np.int8)
         states[occupancy == 0], states[occupancy == 100] = FREE, OCCUPIED
         columns, rows = np.nonzero(states.T == FREE)
-        free = (
-            centre_x + (columns - half_x) * resolution_m,
-            centre_y + (rows - half_y) * resolution_m,
-        )
+        cells = np.column_stack((columns - half_x, rows - half_y))
         frame = MapFrame(size_x, size_y, float(resolution_m), float(centre_x), float(centre_y))
-        return cls(states, frame, np.column_stack(free))
+        return cls(states, frame, np.array((centre_x, centre_y)) + cells * resolution_m)
 
 
 @njit(cache=True, nogil=True)
-def column_of(frame: MapFrame, x: float) -> float:
-    """Return the column of x, a whole number that may lie outside the map, or NaN."""
-    return np.floor((x - frame.centre_x) / frame.resolution + 0.5) + frame.size_x // 2
-
-
-@njit(cache=True, nogil=True)
-def row_of(frame: MapFrame, y: float) -> float:
-    """Return the row of y, a whole number that may lie outside the map, or NaN."""
-    return np.floor((y - frame.centre_y) / frame.resolution + 0.5) + frame.size_y // 2
+def cell_of(frame: MapFrame, x: float, y: float) -> Tuple[float, float]:
+    """Return column and row of a point, whole numbers that may lie outside the map, or NaN."""
+    column = np.floor((x - frame.centre_x) / frame.resolution + 0.5) + frame.size_x // 2
+    return column, np.floor((y - frame.centre_y) / frame.resolution + 0.5) + frame.size_y // 2
 
 
 @njit(cache=True, nogil=True)
@@ -109,12 +93,12 @@ def ray_range(
     beyond its end; the distance is that of the two cells.
     """
     reach = min(longest, _LONGEST_RAY_CELLS * frame.resolution)
-    column, row = column_of(frame, x), row_of(frame, y)
+    column, row = cell_of(frame, x, y)
     if not is_inside(frame, column, row):
         return 0.0
     x0, y0 = int(column), int(row)
-    x1 = int(column_of(frame, x + reach * math.cos(angle)))
-    y1 = int(row_of(frame, y + reach * math.sin(angle)))
+    column, row = cell_of(frame, x + reach * math.cos(angle), y + reach * math.sin(angle))
+    x1, y1 = int(column), int(row)
     is_steep = abs(y1 - y0) > abs(x1 - x0)
     if is_steep:
         x0, y0, x1, y1 = y0, x0, y1, x1

@@ -290,6 +290,8 @@ class AmclNode:
                 params.odom_frame_id, params.base_frame_id, scan.stamp_s, 0.0
             )
             if latest is None and (error.later or self._odom_from_base is None):
+                if len(self._scans) == _QUEUE:
+                    self._warn(f"scans wait for tf: {error}")
                 return False  # the stamp is younger than the latest transform
             problem = str(error)
         if problem:

@@ -15,10 +15,9 @@ from quad_localization.laser import Laser
 from quad_localization.likelihood_field import likelihood_field, obstacle_distances
 from quad_localization.occupancy_map import (
     OccupancyMap,
-    column_of,
+    cell_of,
     is_inside,
     ray_range,
-    row_of,
 )
 from quad_localization.odometry_models import angle_difference, moved
 from quad_localization.parameters import BEAM, AmclParams, read_params
@@ -67,7 +66,7 @@ def check_field(path: Path) -> List[Difference]:
     comparison.exact("occ_state", grid.states, arrays["occ_state"])
     distances = obstacle_distances(grid, meta["params"]["laser_likelihood_max_dist"])
     comparison.exact("occ_dist", distances, arrays["occ_dist"])
-    cells = [(column_of(frame, x), row_of(frame, y)) for x, y in arrays["points"].tolist()]
+    cells = [cell_of(frame, x, y) for x, y in arrays["points"].tolist()]
     comparison.exact("cells", np.array(cells), arrays["cells"].astype(np.float64))
     inside = [is_inside(frame, *cell) for cell in cells]
     comparison.exact("cells_valid", inside, arrays["cells_valid"] != 0)
