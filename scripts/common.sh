@@ -25,7 +25,7 @@ lock() {
 # require_writable FOLDER: before something is made there.
 require_writable() {
     [ -w "$1" ] || fail "$(cd "$1" && pwd -P): cannot be written by $(id -un), and its set-up is not complete;" \
-        "its owner runs 'make workspace' there, or you clone the checkout into a folder of your own"
+        "its owner runs the same command there first, or you clone the checkout into a folder of your own"
 }
 
 # start_clock: shows on a terminal, until the script ends, how long the rest of it has taken.

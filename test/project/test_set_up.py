@@ -98,7 +98,7 @@ def test_a_checkout_that_cannot_be_written_is_named_with_what_to_do(command, che
     checkout.chmod(0o755)
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].startswith(f"quad: {checkout}: cannot be written by ")
-    assert "its owner runs 'make workspace'" in done.stderr
+    assert "its owner runs the same command there" in done.stderr
 
 
 def test_a_complete_environment_of_somebody_else_is_used(checkout):
