@@ -10,6 +10,7 @@ from quad_nav.files.shipped import shipped
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.scenario.goal_plans import unreachable_goals
 from quad_nav.scenario.mission_setup import read_setup as read_mission
+from quad_nav.scenario.simulator_setup import read_setup as read_simulator
 from quad_nav.sim.obstacles import Box
 from quad_nav.sim.scene import Scene, Walls
 from quad_nav.sim.scene_file import load_scene
@@ -38,6 +39,8 @@ def test_starts_are_chosen_where_the_goals_can_be_reached():
     assert inside_room(setup.scene) == [1]  # only the goal of quad1 is inside
     assert unreachable_goals(setup) == []
     assert inside_room(load_scene(case / "map.yaml")) == []
+    node = {"scene": str(case / "map.yaml"), "goals": str(case), "robots": 2}
+    assert read_simulator(node, "/simulator").scene.starts == setup.scene.starts
 
 
 @pytest.mark.parametrize(
