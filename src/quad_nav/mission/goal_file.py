@@ -263,7 +263,8 @@ def goals_of(
         raise InputError([f"{name}: has goals of {count} robot{'s' * (count > 1)}; {expected}"])
     entries = waypoints.entries(robot)
     if not 0 < len(entries) <= MAX_GOALS:
-        raise InputError([f"{name}: has {len(entries)} waypoints; expected 1 to {MAX_GOALS}"])
+        found = "; ".join([f"{name}: has {len(entries)} waypoints", *waypoints.notes])
+        raise InputError([f"{found}; expected 1 to {MAX_GOALS}"])
     goals: List[Goal] = []
     problems: List[str] = []
     for number, (value, place, faults) in enumerate(entries, 1):

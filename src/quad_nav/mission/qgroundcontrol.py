@@ -101,7 +101,8 @@ def _plan_items(items: Tree, problems: List[str]) -> Iterator[_Item]:
             yield from _plan_items(nested, problems)
         elif len(params) < 7:
             kind = _child(item, "complexItemType").value or "an item"
-            problems.append(f"line {item.line}: {kind} without seven params; expected them")
+            expected = "expected seven params, or the Items that a pattern flies"
+            problems.append(f"line {item.line}: {kind} has neither; {expected}")
         else:
             frame, command = _child(item, "frame").value, _child(item, "command").value
             yield _Item(command, frame, params, item.line)

@@ -132,19 +132,19 @@ def _read(text: str) -> Optional[WaypointList]:
     if start.startswith(TUW):
         return WaypointList("goals of tuw_multi_robot", tuple(read_tuw(text)))
     if start[:1] in ("{", "["):
-        return _read_tree(text, "JSON") if _is_of_others(text) else None
+        return _read_tree(text) if _is_of_others(text) else None
     if not start or start.startswith('"goals"'):
         return None
     table = read_table(text)
     if table is not None:
         kind, records = table
         return _with_datum(WaypointList(kind, (NamedRecords("", records),)))
-    return _read_tree(text, "YAML")
+    return _read_tree(text)
 
 
-def _read_tree(text: str, language: str) -> Optional[WaypointList]:
+def _read_tree(text: str) -> Optional[WaypointList]:
     documents = read_documents(text)
-    if language == "JSON" and isinstance(documents[0].value, dict):
+    if documents and isinstance(documents[0].value, dict):
         kind = documents[0].value.get("fileType")
         if kind is not None and kind.value == "Plan":
             return _mission(read_plan(documents[0]), "a plan of QGroundControl")
@@ -155,7 +155,7 @@ def _read_tree(text: str, language: str) -> Optional[WaypointList]:
     how = f" ({keys})" if keys else f" ({len(documents)} messages)" if len(documents) > 1 else ""
     other = sorted(frames(documents) - _MAP_FRAMES)
     notes = (f"frame {', '.join(other)} taken as map",) if other else ()
-    return _with_datum(WaypointList(f"waypoints in {language}{how}", tuple(lists), notes=notes))
+    return _with_datum(WaypointList(f"waypoints in YAML or JSON{how}", tuple(lists), notes=notes))
 
 
 def _mission(mission: Mission, kind: str) -> WaypointList:

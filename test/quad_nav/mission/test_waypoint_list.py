@@ -148,7 +148,7 @@ def test_waits_and_heights_and_frames():
     sequence = read("- {x: 1, y: 2, z: 1.5, wait_time: 3}\n- {x: 3, y: 4, frame_id: odom}\n")
     assert sequence.goals == (Goal(1.0, 2.0, wait_s=3.0), Goal(3.0, 4.0))
     assert sequence.read_as == (
-        "read as waypoints in YAML: 2 goals; heights (z) left out; frame odom taken as map"
+        "read as waypoints in YAML or JSON: 2 goals; heights (z) left out; frame odom taken as map"
     )
 
 
@@ -295,7 +295,14 @@ def test_the_first_waypoint_is_the_datum_without_home():
             "line 6 (goal 1): lat 47.0009, lon 8.0 in frame 2.0",
         ),
         (plan([item(16, 0, 0)]), "line 5 (goal 1): lat 0, lon 0 in frame 3; expected degrees"),
-        (plan([{"complexItemType": "survey"}]), "line 5: survey without seven params"),
+        (
+            plan([item(22, 47.0, 8.0)]),
+            "has 0 waypoints; commands left out: 22; expected 1 to 10000",
+        ),
+        (
+            plan([{"complexItemType": "survey"}]),
+            "line 5: survey has neither; expected seven params, or the Items",
+        ),
         (TUW.replace("robot_0\n", ""), "line 4: a goal; expected the name of its robot before it"),
         (TUW + "robot_2\n", "robot_2: has no goals; expected one"),
         ("a: \x00", "not YAML: unacceptable character"),
