@@ -45,6 +45,7 @@ DEFAULTS: Dict[str, Any] = {
     "start_service": "",  # called before the first goal; the simulator's with `simulation`
     "end_service": "",  # called after the last goal, before the node exits
     "ready_timeout": 180.0,  # kernels may have to be compiled first, in each process
+    "viewers": "",  # names of nodes that show the flight and are waited for, with spaces between
     "exit_when_done": False,
     "result": "",
     "resume": False,
@@ -52,7 +53,7 @@ DEFAULTS: Dict[str, Any] = {
 }
 # ``read_scenario`` checks the others.
 _OWN = ["simulation", "start_service", "end_service", "ready_timeout", "exit_when_done"]
-_OWN += ["result", "resume", "journal"]
+_OWN += ["result", "resume", "journal", "viewers"]
 _RULES = {"config": optional(RULES["config"]), **{name: RULES[name] for name in _OWN}}
 
 
@@ -64,7 +65,7 @@ class MissionSetup:
     ``people``, where people are who react to quadcopters; None if there are none. ``start_service``
     is called before the first goal is sent, ``end_service`` before the node exits, if they have
     names. ``configurations`` are the navigators', None for one whose parameters are unknown.
-    ``facts`` are for the summary.
+    ``facts`` are for the summary. ``viewers`` are nodes that should hear the flight's beginning.
     """
 
     robots: Tuple[RobotGoals, ...]
@@ -83,6 +84,7 @@ class MissionSetup:
     start_service: str = ""
     end_service: str = ""
     people: Optional[CrowdRecord] = None
+    viewers: Tuple[str, ...] = ()
 
     @property
     def parameters(self) -> Tuple[Mapping[str, Any], ...]:
@@ -170,6 +172,7 @@ def _mission_setup(
         start_service=values["start_service"] or (START_SERVICE if values["simulation"] else ""),
         end_service=values["end_service"],
         people=people,
+        viewers=tuple(values["viewers"].split()),
     )
 
 

@@ -108,6 +108,7 @@ RULES: Dict[str, Rule] = {
     "start_service": optional(text("the name of a service")),
     "end_service": optional(text("the name of a service")),
     "ready_timeout": number(above=0, unit="seconds"),
+    "viewers": optional(text("names of nodes with spaces between")),
     "exit_when_done": BOOLEAN,
     "resume": BOOLEAN,
     "result": optional(text("a file to write")),

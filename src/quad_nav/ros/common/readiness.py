@@ -198,6 +198,12 @@ def service_exists(name: str) -> bool:
     return name in _providers(2)
 
 
+def hears(node: str, topics: Sequence[str]) -> bool:
+    """Return whether a node subscribes to one of some topics."""
+    subscribed = rosgraph.Master(rospy.get_name()).getSystemState()[1]
+    return any(topic in topics and f"/{node}" in nodes for topic, nodes in subscribed)
+
+
 def lost_service(service: str, node: str) -> str:
     """Say that the ROS master or the node that provides a service has died; "" if neither has.
 

@@ -95,6 +95,13 @@ class NavigatorLoop:
                 robot.restart(self._now_s)
         return 0.0 if before_wall_s is None else self._wall_s - before_wall_s
 
+    @property
+    def _hint(self) -> str:
+        """What helps against a late loop."""
+        if is_wallclock():
+            return "use a lower controller_frequency or smaller costmaps"
+        return "use a lower rate:=" + ", fewer robots or more hosts:=" * (len(self._robots) > 1)
+
     def _step(self, now_s: float) -> None:
         for one in self._peers:
             one.refresh(now_s)
@@ -103,8 +110,7 @@ class NavigatorLoop:
         if late_s > LATE_S:
             rospy.logwarn_throttle(
                 WARN_AGAIN_S,
-                f"{self._name}: control loop {late_s:.2f} s behind, skipping cycles (use a"
-                " lower rate:=, fewer robots or more hosts:=)",
+                f"{self._name}: control loop {late_s:.2f} s behind, skipping cycles ({self._hint})",
             )
         for robot in self._robots:
             if robot.has_request or is_due(robot.due_s, now_s):

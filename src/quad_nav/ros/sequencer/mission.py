@@ -136,6 +136,17 @@ class MissionRunner:
                 needs += _robot_needs(robot, self._feed)
         return needs
 
+    def viewers(self) -> List[Need]:
+        """Return a condition for each viewer: it hears what this node publishes."""
+        topics = (self._goals.resolved_name, self._flight.resolved_name)
+        return [
+            Need(
+                lambda node=node: readiness.hears(node, topics),
+                lambda node=node: f"{node}: is not ready to show the flight",
+            )
+            for node in self._setup.viewers
+        ]
+
     def start(self) -> None:
         """Start the simulation or the vehicles, and begin or resume the mission.
 

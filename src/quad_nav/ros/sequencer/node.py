@@ -36,6 +36,7 @@ from quad_nav.scenario.mission_setup import START_SERVICE, MissionSetup
 STOPPED = "stopped before all goals were reached"
 Stop = Callable[[], str]
 """Returns why the node shuts down, "" if nothing is known."""
+VIEWERS_S = 60.0  # wall time; longest wait for RViz or the page: without a window none comes up
 DIAGNOSTICS_PERIOD_S = 1.0  # wall time, to show the state of a paused simulation
 
 
@@ -89,6 +90,9 @@ def fly(mission: MissionRunner, setup: MissionSetup, result: Path, stop: Stop) -
     if missing:
         reason = STOPPED if rospy.is_shutdown() else "not ready"
         return _not_flown(setup, result, stop() if stop() == INTERRUPTED else reason, missing)
+    late = readiness.wait_for(mission.viewers(), VIEWERS_S)
+    if late and not rospy.is_shutdown():
+        rospy.logwarn("sequencer: the flight starts all the same:\n  %s", "\n  ".join(late))
     try:
         mission.start()
     except (rospy.ServiceException, rospy.ROSException) as error:
