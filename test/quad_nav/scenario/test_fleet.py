@@ -10,8 +10,10 @@ from quad_nav.files.shipped import shipped
 from quad_nav.scenario.coverage import scene_bounds
 from quad_nav.scenario.fleet_setup import read_setup
 from quad_nav.scenario.random_mission import random_mission
+from quad_nav.scenario.rules import MAX_ROBOTS
 from quad_nav.scenario.scenario import read_configurations, scene_of
 from quad_nav.sim.colours import ROBOT_COLOURS
+from quad_nav.topics.markers import number_markers, quadcopter_markers
 from quad_nav.topics.publishing import in_fleet, own_node
 from quad_nav.topics.rviz_file import document
 
@@ -111,6 +113,14 @@ def test_rviz_shows_every_quadcopter_in_its_colour():
         assert topics["Local costmap"] == f"/move_base{number}/local_costmap/costmap"
         path = next(one for one in group["Displays"] if one["Name"] == "Flown path")
         assert path["Color"] == "; ".join(map(str, ROBOT_COLOURS[number]))
+
+
+def test_rviz_keeps_all_markers_until_their_frames_are_known():
+    scene = random_mission(MAX_ROBOTS, 0).scene
+    displays = document(MAX_ROBOTS, scene)["Visualization Manager"]["Displays"]
+    markers = len(quadcopter_markers(MAX_ROBOTS) + number_markers(MAX_ROBOTS, scene))
+    shown = {one["Name"]: one for one in displays if one["Class"] == "rviz/MarkerArray"}
+    assert all(one["Queue Size"] >= markers for one in shown.values()) and "Quadcopters" in shown
 
 
 def test_rviz_of_many_listens_to_the_overview_only():
