@@ -180,17 +180,23 @@ class _Ground:
         for number in range(MAX_CHOSEN_STARTS):
             goal = goals[number] if number < len(goals) else None
             part = (self._part(*goal) if goal else 0) or largest
-            for index in np.flatnonzero(left & (self._place_parts == part)):
-                x_m, y_m = self._places[index].tolist()
-                left[index] = False
-                if (
-                    self._scene.surface_distance_m(x_m, y_m, self._scene.altitude_m)
-                    >= self._distance_m
-                ):
-                    starts.append(Pose2D(x_m, y_m))
-                    left &= np.hypot(*(self._places - (x_m, y_m)).T) >= START_SPACING_M
-                    break
+            start = self._start(left, part) or self._start(left, largest)
+            if start is None:
+                break
+            starts.append(start)
+            offsets_m = self._places - (start.x_m, start.y_m)
+            left &= np.hypot(*offsets_m.T) >= START_SPACING_M
         return starts
+
+    def _start(self, left: NDArray[np.bool_], part: int) -> Optional[Pose2D]:
+        """Return the first place that is left in a part; those that are too narrow are left out."""
+        altitude_m = self._scene.altitude_m
+        for index in np.flatnonzero(left & (self._place_parts == part)):
+            x_m, y_m = self._places[index].tolist()
+            if self._scene.surface_distance_m(x_m, y_m, altitude_m) >= self._distance_m:
+                return Pose2D(x_m, y_m)
+            left[index] = False
+        return None
 
 
 def _lattice(scene: Scene) -> List[Tuple[float, float]]:
