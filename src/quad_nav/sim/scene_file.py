@@ -69,7 +69,7 @@ _KEYS = [
 ]
 _WORLD_SUFFIXES = (".world", ".sdf")
 _ROOM_M = 2.0
-"""Room on each side of a world too narrow to be a room itself, such as a table or a single wall."""
+"""Room on each side of a world that is no room itself, such as a table or a single wall."""
 MAX_SIZE_M = 1e5
 MAX_STARTS = 1000
 
