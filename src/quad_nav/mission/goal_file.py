@@ -162,9 +162,7 @@ def parse_goals(
     Args:
         content: The content, UTF-8 if bytes.
         name: Name of the file, for messages.
-        check_place: Check for the positions of goals.
-        defaults: Settings that the content does not give.
-        robot: Which of the robots of a list of waypoints.
+        check_place, defaults, robot: As for ``load_goals``.
 
     Returns:
         The goals as in the file, nothing added or moved: the page writes them back.
