@@ -162,17 +162,18 @@ def parse_goals(
     Args:
         content: The content, UTF-8 if bytes.
         name: Name of the file, for messages.
-        check_place, defaults, robot: As for ``load_goals``.
+        check_place: Check for the positions of goals.
+        defaults: Settings that the content does not give.
+        robot: Which of the robots of a list of waypoints.
 
     Returns:
         The goals as in the file, nothing added or moved: the page writes them back.
 
     Raises:
-        InputError: The content has faults; lists all of them.
+        InputError: Every fault of the content.
     """
     text = decoded(content, name)
-    waypoints = read_waypoints(text, name)
-    if waypoints is not None:
+    if (waypoints := read_waypoints(text, name)) is not None:
         return goals_of(waypoints, name, check_place, defaults, robot)
     tree, problems = _tree(text, name)
     if not isinstance(tree, dict):
