@@ -173,7 +173,7 @@ def parse_goals(
         The goals as in the file, nothing added or moved: the page writes them back.
 
     Raises:
-        InputError: The content has faults; lists all of them.
+        InputError: Every fault of the content.
     """
     text = decoded(content, name)
     # A mistake in a file with our name is a mistake, not another format.

@@ -51,7 +51,8 @@ def read_table(text: str) -> Optional[Tuple[str, List[Record]]]:
     else:
         columns = _unnamed(rows[0])
         kind = f"a table without names, of the columns {', '.join(columns)}"
-    return kind, [_record(row, columns, rows[0]) for row in rows]
+    width = 0 if names else _width(rows[0])
+    return kind, [_record(row, columns, width) for row in rows]
 
 
 def read_tuw(text: str) -> List[NamedRecords]:
@@ -69,7 +70,7 @@ def read_tuw(text: str) -> List[NamedRecords]:
         cells = [cell.strip() for cell in line.split(",")]
         if len(cells) > 1 and robots:
             fields = LISTS[7 if len(cells) > 4 else 4]
-            robots[-1].records.append(_record(_Row(cells, number), _columns(fields), None))
+            robots[-1].records.append(_record(_Row(cells, number), _columns(fields), len(fields)))
         elif len(cells) > 1:
             problems.append(f"line {number}: a goal; expected the name of its robot before it")
         elif cells[0]:
@@ -97,8 +98,7 @@ def _cells(line: str) -> List[str]:
     separator = next((one for one in ",;\t" if one in line), "")
     if not separator:
         return line.split()
-    cells = [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
-    return cells[:-1] if len(cells) > 1 and not cells[-1] else cells
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
 
 
 def _numeric(row: _Row) -> List[int]:
@@ -137,13 +137,16 @@ def _columns(fields: Sequence[str]) -> Dict[str, int]:
     return {field: k for k, field in enumerate(fields)}
 
 
-def _record(row: _Row, columns: Dict[str, int], first: Optional[_Row]) -> Record:
-    """Return the record of a row; cells that are missing are no fields of it."""
-    record = {
-        field: Value(row.cells[k], row.line) for field, k in columns.items() if k < len(row.cells)
-    }
-    if first is not None and len(row.cells) != len(first.cells) or len(record) < len(columns):
-        expected = len(columns) if first is None else len(first.cells)
-        text = f"has {len(row.cells)} columns; expected {expected}"
+def _record(row: _Row, columns: Dict[str, int], width: int) -> Record:
+    """Return the record of a row; ``width`` is the number of columns without names, else 0."""
+    needed = max(columns.values()) + 1
+    if len(row.cells) < needed or (width and _width(row) != width):
+        text = f"has {_width(row)} columns; expected {width or needed}"
         return {PLACE: Value(text, row.line)}
-    return {PLACE: Value(None, row.line), **record}
+    fields = {field: Value(row.cells[k], row.line) for field, k in columns.items()}
+    return {PLACE: Value(None, row.line), **fields}
+
+
+def _width(row: _Row) -> int:
+    """Return the number of cells up to the last one that is not empty."""
+    return max((k + 1 for k, cell in enumerate(row.cells) if cell), default=0)

@@ -112,7 +112,8 @@ POSITIONS = {
 """,
     "pairs": "[[1, 2], [3, -4]]",
     "x, y": "1, 2\n3, -4\n",
-    "x, y with names": "x,y\n1e0,2\n3,-4\n",
+    "x, y with names": "x,y\n1e0,2\n3,-4,\n",
+    "yaws that are empty": "x; y; yaw; command\n1; 2;; wait\n3;-4;\n",
     "odometry": """pose: {pose: {position: {x: 1, y: 2}}}
 twist: {twist: {linear: {x: 9, y: 9}}}
 ---
