@@ -27,6 +27,7 @@ from urllib.parse import parse_qs, urlsplit
 
 from quad_nav.errors import QuadError
 from quad_web.view.actions import Role
+from quad_web.view.result import REPORT, SUMMARY
 
 ROLE = "quad.role"
 """Key of the role in the scope of a request."""
@@ -179,7 +180,7 @@ def _cookie(text: str, name: str) -> str:
 
 def _is_served(scope: Message) -> bool:
     path, method = scope["path"], scope.get("method", "GET")
-    if scope["type"] == "http" and path in ("/", "/favicon.ico"):
+    if scope["type"] == "http" and path in ("/", "/favicon.ico", REPORT, SUMMARY):
         return method in ("GET", "HEAD")
     if path.startswith("/_nicegui/"):
         return method in ("GET", "HEAD")

@@ -98,6 +98,7 @@ class FlightBar:
     def _make_title(self) -> None:
         with ui.element("div").classes("title-box"):
             self._title = ui.label("waiting for data").classes("title").props("data-testid=title")
+            self._title.tag = "h1"
             self._source_chip = ui.label().classes("muted text-caption").props("data-testid=source")
         self._state = ui.label().classes("chip flight-state").props("data-testid=flight-state")
         self._time = ui.label("–:––").classes("time").props("data-testid=time")
@@ -148,7 +149,7 @@ class FlightBar:
         self._state.text = state  # sends the properties, too
         time_s, duration_s = flight.get("time_s"), flight.get("duration_s")
         self._time.text = clock_text(time_s)
-        self._rate_shown.text = rate_text(flight.get("rate"))
+        self._rate_shown.text = "" if state == "ended" else rate_text(flight.get("rate"))
         self._show_play(state)
         self._show_rate(flight)
         if duration_s and not self._is_held:

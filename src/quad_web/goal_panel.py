@@ -179,7 +179,8 @@ class GoalEditor:
                 ("delete", "delete", lambda: self._edited("delete", index)),
             ):
                 button = ui.button(icon=icon, on_click=act).props("flat dense round size=sm")
-                button.props(f"data-testid=g-{name}-{index} title={name}").set_enabled(can_edit)
+                button.props(f"data-testid=g-{name}-{index} title={name} aria-label={name}")
+                button.set_enabled(can_edit)
             row["fault"] = ui.label().classes("fault").props(f"data-testid=g-fault-{index}")
         return row
 

@@ -50,6 +50,7 @@ class LiveTable(ui.element, component="static/live_table.js"):
         super().__init__()
         self._props.update(columns=list(columns), testid=testid, empty=empty, **options)
         self._props["data-testid"] = testid
+        self._props["picks"] = on_pick is not None
         self._rows: Dict[Any, Row] = {}
         if on_pick is not None:
             self.on("pick", lambda event: on_pick(event.args))

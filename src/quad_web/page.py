@@ -16,6 +16,7 @@ from typing import Any, Dict, Optional
 
 from nicegui import background_tasks, context, ui
 
+import quad_nav
 from quad_nav.errors import excerpt
 from quad_web.arena import SHOWN, SHOWN_AT_FIRST, Arena, Charts, edited_goals, goal_pose
 from quad_web.flight_bar import FlightBar, StopButton, enable
@@ -23,11 +24,15 @@ from quad_web.goal_panel import GoalEditor
 from quad_web.log_panels import Diagnostics, EventLog
 from quad_web.page_client import PageClient
 from quad_web.parameter_panel import Parameters
+from quad_web.result_card import ResultCard
 from quad_web.robot_panels import RobotCard, RobotTable
 from quad_web.view.actions import Actions, Answer, Role
 from quad_web.view.state import FleetState
 
-_STYLE = Path(__file__).parent / "static" / "page.css"
+_STYLES = (
+    Path(quad_nav.__file__).parent / "report" / "colours.css",  # without matplotlib of the package
+    Path(__file__).parent / "static" / "page.css",
+)
 _LONGEST = 600  # characters of an answer
 _REFRESH_S = 0.5
 _FULL_SPEED_REFRESH_S = 1.0  # the flight needs the processor
@@ -62,13 +67,14 @@ class Page:
         self.client = PageClient(state, actions, role, self._toast)
         self._panels: Dict[str, Any] = {}
         self._tabs: Dict[str, Any] = {}
-        ui.add_css(_STYLE)
-        ui.colors(primary="#0b63ce", negative="#c62828", positive="#2e7d32", warning="#b45309")
+        for style in _STYLES:
+            ui.add_css(style)
         with ui.element("div").classes("page"):
             self.bar = FlightBar(self.client)
             self.stop = StopButton(self.client)
             with ui.element("div").classes("arena-box"):
                 self._make_arena()
+                self.result = ResultCard(self.client)
             self._make_tabs("phone", PHONE)
             with ui.element("div").classes("side"):
                 self._make_tabs("side", SIDE)
@@ -107,7 +113,9 @@ class Page:
                 self._tools = {
                     tool: ui.button(
                         icon=icon, on_click=lambda _, tool=tool: self.set_tool(tool)
-                    ).props(f"flat dense data-testid=tool-{tool} title='{title}'")
+                    ).props(
+                        f"flat dense data-testid=tool-{tool} title='{title}' aria-label='{title}'"
+                    )
                     for tool, icon, title in (
                         ("view", "near_me", "Select"),
                         ("goal", "add_location_alt", "Send goal"),
@@ -121,7 +129,7 @@ class Page:
                 self._mode.props("dense unelevated no-caps data-testid=mode")
             with ui.element("div").classes("group"):
                 button = ui.button(icon="layers")
-            button.props("flat dense data-testid=layers title='Layers'")
+            button.props("flat dense data-testid=layers title='Layers' aria-label='Layers'")
             with button, ui.menu().classes("layers"):
                 self._switches = {
                     name: ui.switch(
@@ -147,6 +155,7 @@ class Page:
 
     def _panel(self, name: str) -> Any:
         panel = ui.element("section").classes(f"panel panel-{name}")
+        panel.props["aria-label"] = {**SIDE, **DOCK, "robot": "Selected robot"}[name]
         self._panels[name] = panel.props(f"data-testid=panel-{name}")
         return panel
 
@@ -178,7 +187,8 @@ class Page:
 
     def refresh(self) -> None:
         """Show what has changed in the state."""
-        for panel in (self.bar, self.table, self.card, self.events, self.diagnostics):
+        shown = (self.bar, self.result, self.table, self.card, self.events, self.diagnostics)
+        for panel in shown:
             panel.refresh()
         problems = self.diagnostics.problems
         for place in ("dock", "phone"):
@@ -205,8 +215,11 @@ class Page:
                 classes = {"add": f"on-{place}"} if is_on else {"remove": f"on-{place}"}
                 panel.classes(**classes)
 
-    async def _tab_chosen(self) -> None:
+    async def _tab_chosen(self, event: Any) -> None:
         self._show_panels()
+        is_beside = event.sender is not self._tabs["dock"] and event.value != "goals"
+        if is_beside and self._tool == "edit":
+            self.set_tool("view")  # goals are edited beside their list
         await self._read()
 
     def _toast(self, answer: Answer) -> None:
@@ -233,6 +246,7 @@ class Page:
         self._show_tool(tool)
 
     def _show_tool(self, tool: str) -> None:
+        self._tool = tool
         for name, button in self._tools.items():
             classes = {"add": "is-on"} if name == tool else {"remove": "is-on"}
             button.classes(**classes)

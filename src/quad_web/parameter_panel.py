@@ -37,14 +37,29 @@ def widget_kind(parameter: ParameterView) -> str:
     return "slider" if is_range else "number"
 
 
-def slider_step(parameter: ParameterView) -> float:
-    """Return a step of 1, 2 or 5 times a power of ten: about 200 steps, whole ones of an "int"."""
-    low, high = parameter.minimum, parameter.maximum
-    assert low is not None and high is not None
-    fine = (high - low) / _STEPS
-    power = 10.0 ** math.floor(math.log10(fine))
-    step = next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= fine * (1.0 - 1e-9))
-    return max(1.0, round(step)) if parameter.kind == "int" else step
+def slider_range(parameter: ParameterView) -> Tuple[float, float]:
+    """Return the ends of a slider: the range, but not far beyond the size of the values.
+
+    The values in force and of the file lie below half of it. A number may be typed beyond.
+    """
+    low, high = float(parameter.minimum or 0.0), float(parameter.maximum or 0.0)
+    size = max(abs(float(value or 0.0)) for value in (parameter.value, parameter.file_value))
+    if size > 0.0:
+        reach = round_up(2.0 * size)
+        low, high = max(low, min(-reach, high)), min(high, max(reach, low))
+    return low, high
+
+
+def slider_step(low: float, high: float, kind: str) -> float:
+    """Return a round step, about 200 of them, whole ones of an "int"."""
+    step = round_up((high - low) / _STEPS)
+    return max(1.0, round(step)) if kind == "int" else step
+
+
+def round_up(number: float) -> float:
+    """Return the next 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(number))
+    return next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= number * (1.0 - 1e-9))
 
 
 def is_found(parameter: ParameterView, text: str) -> bool:
@@ -111,21 +126,27 @@ class ParameterRow:
             first: Any = ui.switch(value=bool(parameter.value)).props("dense")
             first.on("update:model-value", lambda: self._set(bool(first.value)))
         elif kind == "select":
-            options = {value: f"{label} ({value})" for label, value in parameter.choices}
+            options = {
+                value: label if label == value else f"{label} ({value})"
+                for label, value in parameter.choices
+            }
             options.setdefault(parameter.value, value_text(parameter.value))
             first = ui.select(options, value=parameter.value).props("dense outlined options-dense")
             first.on("update:model-value", lambda: self._set(first.value))
         elif kind == "slider":
-            low, high = float(parameter.minimum or 0.0), float(parameter.maximum or 0.0)
-            first = ui.slider(min=low, max=high, step=slider_step(parameter), value=low)
+            low, high = slider_range(parameter)
+            step = slider_step(low, high, parameter.kind)
+            first = ui.slider(min=low, max=high, step=step, value=low)
             first.props("dense").on("change", lambda: self._set_number(first.value))
         else:
             first = self._field()
         self._inputs.append(first)
         first.props["data-testid"] = f"value-{name}"
+        first.props["aria-label"] = parameter.name
         if kind == "slider":
             self._inputs.append(self._field())
             self._inputs[-1].props["data-testid"] = f"number-{name}"
+            self._inputs[-1].props["aria-label"] = f"{parameter.name}, number"
 
     def _field(self) -> Any:
         field = ui.input(value=value_text(self.parameter.value)).props("dense outlined")
@@ -149,6 +170,10 @@ class ParameterRow:
         """Put the value in force into the control, as after a refusal."""
         for element in self._inputs:
             is_typed = isinstance(element, ui.input)
+            if isinstance(element, ui.slider):
+                low, high = slider_range(self.parameter)
+                step = slider_step(low, high, self.parameter.kind)
+                element.props.update(min=low, max=high, step=step)
             element.value = value_text(self.parameter.value) if is_typed else self.parameter.value
 
     async def _set(self, value: Any) -> None:
@@ -223,12 +248,7 @@ class Parameters:
             self._note.text = "Select a robot to see its parameters."
         elif not found:
             self._note.text = f"{self._client.name(robot)} has no parameters that can be changed."
-        else:
-            count = sum(map(is_changed, found))
-            text = f"{self._client.name(robot)}: {len(found)} parameters"
-            self._note.text = f"{text}, {count} changed" if count else text
-        if is_other or self._only.value:
-            self._lay_out(is_other)
+        self._lay_out(is_other)
         for parameter in found:
             row = self._rows.get((parameter.namespace, parameter.name))
             if row is not None:
@@ -243,6 +263,11 @@ class Parameters:
             for one in self._parameters
             if is_found(one, text) and (is_changed(one) or not self._only.value)
         ]
+        if self._parameters:
+            count, name = len(self._parameters), self._client.name(self._robot)
+            changed = sum(map(is_changed, self._parameters))
+            text = f"{len(shown)} of {count} shown" if is_sought else f"{count} parameters"
+            self._note.text = f"{name}: {text}" + (f", {changed} changed" if changed else "")
         layout = (is_sought, [(one.namespace, one.name) for one in shown])
         if layout == self._layout and not is_other:
             return

@@ -155,10 +155,13 @@ class RobotCard:
         with ui.element("div").classes("card-head"):
             self._dot = ui.element("span").classes("dot")
             self._name = ui.label().classes("card-name").props("data-testid=card-name")
+            self._name.tag = "h2"
             self._state = ui.label().classes("chip state").props("data-testid=card-state")
             ui.space()
             self._deselect = ui.button(icon="close", on_click=lambda: self._client.select(None))
-            self._deselect.props("flat dense round size=sm data-testid=deselect title=Deselect")
+            self._deselect.props(
+                "flat dense round size=sm data-testid=deselect title=Deselect aria-label=Deselect"
+            )
         self._reason = ui.label().classes("muted")
 
     def _make_facts(self) -> None:
@@ -202,6 +205,8 @@ class RobotCard:
             ]
             send = ui.button("Send", on_click=self._send_typed)
             send.props("unelevated dense no-caps data-testid=goal-send")
+            for field in self._fields:
+                field.on("keydown.enter", self._send_typed)
             for element in (tool, *self._fields, send):
                 enable(element, client, "send_goal")
         self._fault = ui.label().classes("fault").props("data-testid=goal-fault")
@@ -241,9 +246,9 @@ class RobotCard:
         facts = {
             "position": f"{pose.x_m:.2f}, {pose.y_m:.2f} m" if pose else "–",
             "heading": f"{math.degrees(pose.yaw_rad):.0f}°" if pose else "–",
-            "speed": _with_unit(shown["speed_mps"], "m/s"),
+            "speed": with_unit(shown["speed_mps"], "m/s"),
             "goal": _goal_text(shown["goal"], shown["goal_distance"]),
-            "gap": _with_unit(shown["gap_m"], "m"),
+            "gap": with_unit(shown["gap_m"], "m"),
             "recoveries left": f"{used[1] - used[0]} of {used[1]}" if used and used[1] else "–",
         }
         for name, text in facts.items():
@@ -281,7 +286,8 @@ class RobotCard:
         await self._client.call("send_goal", robot, pose, robot=robot)
 
 
-def _with_unit(value: Optional[float], unit: str) -> str:
+def with_unit(value: Optional[float], unit: str) -> str:
+    """Return a quantity for people."""
     return "–" if value is None else f"{value:.2f} {unit}"
 
 

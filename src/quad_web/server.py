@@ -10,6 +10,7 @@ import errno
 import importlib
 import importlib.util
 import logging
+import os
 import re
 import secrets
 import socket
@@ -24,6 +25,7 @@ from quad_web.connections import MAX_OF_ADDRESS, limited
 from quad_web.page_limits import Complaints, drop_old_pages, limit_pages, only_texts
 from quad_web.stream import Message, Receive, Send, Stream
 from quad_web.view.actions import Actions, Role, WatchOnly
+from quad_web.view.result import REPORT, SUMMARY
 from quad_web.view.state import FleetState
 
 _FIRST_PORT, _LAST_PORT = 8080, 8179
@@ -120,7 +122,7 @@ class Server:
         self._socket = _bound(options)
         self.port = port = self._socket.getsockname()[1]
         self.urls = _urls(options.address, port, tokens)
-        self._stream = Stream(state)
+        self._state, self._stream = state, Stream(state)
         # Compression halves the stream and quarters the page, for twice the server's time: worth it
         # where a radio link may be between.
         is_remote = not is_loopback(options.address)
@@ -190,11 +192,26 @@ class Server:
             await self._stream(scope, receive, send)
         elif scope["type"] == "websocket":
             await self._pages(scope, only_texts(receive), send)
+        elif scope.get("path") in (REPORT, SUMMARY):
+            await self._send_result(scope, receive, send)
         elif scope.get("path", "").startswith("/_nicegui_ws/"):  # socket.io without a WebSocket
             await refuse(scope, send, 404, "nothing is here; expected a WebSocket")
         else:
             await self._pages(scope, receive, send)
             drop_old_pages(self._nicegui)
+
+    async def _send_result(self, scope: Message, receive: Receive, send: Send) -> None:
+        """Send the report or the summary of a flight that has ended."""
+        from starlette.responses import FileResponse, JSONResponse
+
+        item = self._state.item("result")
+        data = item.data if item else {}
+        if scope["path"] == SUMMARY and data.get("summary"):
+            await JSONResponse(data["summary"])(scope, receive, send)
+        elif scope["path"] == REPORT and os.path.isfile(data.get("report", "")):
+            await FileResponse(data["report"])(scope, receive, send)
+        else:
+            await refuse(scope, send, 404, "nothing is here; expected a flight that has ended")
 
 
 def _protocols() -> Tuple[Any, Any]:
@@ -227,7 +244,7 @@ def _nicegui_app(nicegui: Any, state: FleetState, actions: Actions, options: Web
         title=options.title,
         viewport="width=device-width, initial-scale=1",
         favicon="🚁",
-        dark=False,
+        dark=None,  # as the reader prefers
         language="en-US",
         binding_refresh_interval=0.5,
         reconnect_timeout=10.0,  # a loaded machine may answer that late

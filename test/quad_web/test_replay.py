@@ -95,15 +95,30 @@ def test_pause_seek_and_the_end(player):
     assert not replay.seek(math.nan).ok
 
 
+def samples_of(state):
+    """Return the samples that a new client gets."""
+    (item,) = [one for one in state.changes(Wanted(), {}).items if one.key == "samples"]
+    return {"times": [], **item.arrays}
+
+
+def test_a_fast_replay_has_samples_of_the_time_between_two_steps(player):
+    _, state, _ = player
+    watch(player)
+    step(player)
+    first_s = state.item("samples").data["time_s"]
+    step(player, 5.0)
+    np.testing.assert_allclose(samples_of(state)["times"][1:], first_s + np.arange(0.1, 4.95, 0.1))
+
+
 def test_after_a_jump_the_charts_have_the_minute_before(player):
     replay, state, _ = player
     watch(player)
     replay.seek(15.0)
     step(player)
-    assert "times" not in state.item("samples").arrays
+    assert samples_of(state)["times"].tolist() == [0.0]
     step(player)  # nobody has jumped again
-    arrays = state.item("samples").arrays
-    np.testing.assert_allclose(arrays["times"], np.arange(1.0, 15.0))
+    arrays = samples_of(state)
+    np.testing.assert_allclose(arrays["times"], np.arange(0.0, 15.0))
     gaps_m = 8.0 - (1.0 + 0.3 * arrays["times"]) - 2 * BODY_RADIUS_M
     np.testing.assert_allclose(arrays["history"][:, 0, 0], gaps_m, atol=1e-5)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from quad_web.parameter_panel import (
     by_namespace,
     is_changed,
     is_found,
+    slider_range,
     slider_step,
     widget_kind,
 )
@@ -91,11 +93,22 @@ def test_control_of_a_parameter(parameter, widget):
 
 
 @pytest.mark.parametrize(
-    "kind, low, high, step",
-    [("double", 0, 5, 0.05), ("double", 0, 1, 0.005), ("int", 1, 100, 1), ("int", 0, 2000, 10)],
+    "kind, value, limits, ends, step",
+    [
+        ("double", 0.3, (0.0, 20.0), (0.0, 1.0), 0.005),
+        ("double", 0.0, (0.0, 5.0), (0.0, 5.0), 0.05),
+        ("double", -0.3, (-20.0, 20.0), (-1.0, 1.0), 0.01),
+        ("double", 15.0, (0.0, 20.0), (0.0, 20.0), 0.1),
+        ("double", -0.2, (-20.0, 0.0), (-0.5, 0.0), 0.005),
+        ("int", 10, (1, 100), (1.0, 20.0), 1.0),
+        ("int", 900, (0, 9000), (0.0, 2000.0), 10.0),
+    ],
 )
-def test_steps_of_sliders_are_round(kind, low, high, step):
-    assert slider_step(view(kind, low, high)) == pytest.approx(step)
+def test_sliders_have_the_size_of_their_values_and_round_steps(kind, value, limits, ends, step):
+    parameter = replace(view(kind, *limits), value=value, file_value=value)
+    assert slider_range(parameter) == pytest.approx(ends)
+    assert slider_step(*ends, kind) == pytest.approx(step)
+    assert slider_range(replace(parameter, file_value=10 * value))[0] >= limits[0]
 
 
 def test_parameters_are_found_by_all_words():

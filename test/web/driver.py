@@ -54,6 +54,16 @@ class Driver:
         self.at(f"robots-row-{robot}").click()
         expect(self.at("card-name")).to_contain_text(str(robot))
 
+    def tab_to(self, selector: str) -> None:
+        """Press Tab until an element has the focus, which each on the way shows by 2 pixels."""
+        for _ in range(_MOST_TABS):
+            self.page.keyboard.press("Tab")
+            found, edge = self.page.evaluate(FOCUS, selector)
+            assert edge in ("2px", None), found
+            if found is True:
+                return
+        raise AssertionError(f"no {selector} within {_MOST_TABS} presses of Tab")
+
     def pixel(self, x_m: float, y_m: float) -> Tuple[float, float]:
         """Return where on the page a point of the arena is."""
         return tuple(
@@ -101,4 +111,13 @@ class Driver:
         expect(self.page.locator(".q-notification").filter(has_text=text).first).to_be_visible()
 
 
+_MOST_TABS = 120
+# Whether an element has the focus, else which one has it; and the width of its outline, null
+# for a field, which has a border, and outside of the page.
+FOCUS = """(selector) => {
+  const at = document.activeElement;
+  const hasOwn = at === document.body || at.closest(".q-field");
+  return [at.matches(selector) || at.outerHTML.slice(0, 200),
+    hasOwn ? null : getComputedStyle(at).outlineWidth];
+}"""
 ARENA = "getElement(document.querySelector('.quad-arena'))?.view"

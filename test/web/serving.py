@@ -63,6 +63,10 @@ class Served:
         self.lines.clear()
         self._ask("again")
 
+    def end(self) -> None:
+        """Have the synthetic fleet end its flight."""
+        self._ask("end")
+
     def _ask(self, line: str) -> None:
         """Write a line to the child, and wait until it has printed it."""
         self.process.stdin.write(f"{line}\n")

@@ -20,7 +20,9 @@ import numpy as np
 
 from quad_nav.geometry import Pose2D, Pose3D, Twist2D, quaternion_from_euler
 from quad_nav.grid import GridSpec
+from quad_nav.mission.flight_log import Leg
 from quad_nav.mission.goal import Goal
+from quad_nav.mission.summary import MissionSummary, RobotSummary
 from quad_nav.peers.right_of_way import Yield, YieldDecision
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.motion import Motion, Walkers
@@ -38,6 +40,7 @@ from quad_web.view.actions import (
     ParameterView,
 )
 from quad_web.view.cells import cell_items
+from quad_web.view.result import result_item
 from quad_web.view.state import FleetState, Item, robots_by_layer
 
 PERIOD_S = 0.1
@@ -130,6 +133,14 @@ class SyntheticFleet:
     def start(self) -> None:
         self._thread.start()
 
+    def end(self) -> None:
+        """End the flight: robot 0 has reached its goal in 70 s of 5 s."""
+        legs = [Leg(0, 1, Goal(1.0, 2.0), True, "", 1, 70.0)]
+        robot = RobotSummary("robot0", tuple(legs), 9.0, 0.41, 1.54)
+        summary = MissionSummary((robot,), sim_time_s=70.0, wall_time_s=5.0)
+        self.flight_state = "ended"
+        self.state.put_all([result_item(summary, None)])
+
     def stop(self) -> None:
         self._ended.set()
         self._thread.join()
@@ -211,6 +222,7 @@ class SyntheticFleet:
             facts = {"goal": 2, "goals": 3, "said": said, "recoveries": (i % 3, 4)}
             now[i] = rows.RobotNow(**{**doing, **facts, "lidar": self.lidars[i]})
         cycles_s = 0.012 + 0.004 * np.sin(self.time_s / 3 + np.arange(len(self.robots)))
+        cycles_s = None if self.duration_s else cycles_s  # recordings have none
         pose = poses.arrays["pose"]
         samples = rows.samples_item(self.time_s, pose, 0.3, self.scene, (), cycles_s)
         return [samples, *rows.fleet_items(now, self._names, samples)]
@@ -316,6 +328,7 @@ class SyntheticActions(Actions):
         return Answer(True, f"robot{robot}: goal cancelled; hovering")
 
     def stop_all(self) -> Answer:
+        self._fleet.flight_state = "stopped"
         return Answer(True, "all goals cancelled; every robot hovers")
 
     def clear_costmaps(self, robot: int) -> Answer:
@@ -353,11 +366,13 @@ class SyntheticActions(Actions):
         return Answer(True, f"goals{robot}.json: {len(goals)} goals saved")
 
 
-def obey_input(actions: SyntheticActions) -> None:
-    """Begin another flight at a line "again", and print each line."""
+def obey_input(fleet: SyntheticFleet, actions: SyntheticActions) -> None:
+    """Begin another flight at a line "again", end it at a line "end", and print each line."""
     for line in map(str.strip, sys.stdin):
         if line == "again":
             actions.renew()
+        elif line == "end":
+            fleet.end()
         say(line)
 
 
@@ -376,7 +391,7 @@ def main() -> None:
     fleet = SyntheticFleet(args.pop("robots"), args.pop("obstacles"), args.pop("replay"))
     actions = SyntheticActions(fleet)
     fleet.start()
-    threading.Thread(target=obey_input, args=[actions], daemon=True).start()
+    threading.Thread(target=obey_input, args=[fleet, actions], daemon=True).start()
     server = Server(fleet.state, actions, WebOptions(on_ready=say, **args))
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job ignores it
     with contextlib.suppress(KeyboardInterrupt):

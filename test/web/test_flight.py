@@ -42,7 +42,7 @@ def near(robot, x_m, y_m):
     return f"(({{x, y}}) => Math.hypot(x - {x_m}, y - {y_m}) < 0.6)(arena.fleet.robots[{robot}])"
 
 
-def test_a_quadcopter_arrives_at_a_goal_that_was_clicked_and_stop_all_ends_its_flight(
+def test_a_quadcopter_arrives_at_a_goal_that_was_clicked_and_stop_all_stops_it(
     serve, open_page, recording
 ):
     """The tutorial's mission; the recording has had the kernels compiled."""
@@ -55,7 +55,66 @@ def test_a_quadcopter_arrives_at_a_goal_that_was_clicked_and_stop_all_ends_its_f
     flight.says("quad1")
     flight.wait_for_arena(near(1, 8.0, 1.5), timeout_s=60)
     flight.page.keyboard.press(".")
+    expect(flight.at("flight-state")).to_have_text("stopped")
+    expect(flight.at("robots-row-0")).to_contain_text("stopped")
+
+
+def test_a_flight_by_keyboard_alone(serve, open_page, goals, recording):
+    """Start, select, send a goal, stop and resume; what has the focus is seen."""
+    flight = Driver(open_page(serve(command=[*QUAD, "fly", "--web", "--goals", goals]).url))
+    state, press = flight.is_ready().at("flight-state"), flight.page.keyboard.press
+    expect(state).to_have_text("running", timeout=60000)
+    for expected in ("paused", "running"):
+        flight.tab_to("[data-testid=play]")
+        press("Enter")
+        expect(state).to_have_text(expected)
+    flight.tab_to("[data-testid=robots-row-0]")
+    press("ArrowDown")
+    press("Enter")
+    expect(flight.at("card-name")).to_have_text("quad1")
+    flight.tab_to("[data-testid=goal-x]")
+    flight.page.keyboard.type("8")
+    flight.tab_to("[data-testid=goal-y]")
+    flight.page.keyboard.type("1.5")
+    press("Enter")
+    flight.says("quad1: sent to (8.00, 1.50)")
+    flight.tab_to("[data-testid=goal-send]")
+    press(".")
+    expect(state).to_have_text("stopped")
+    flight.tab_to("[data-testid=play]")
+    press("Enter")
+    expect(state).to_have_text("running")
+    expect(flight.at("robots-row-1")).not_to_contain_text("stopped")
+
+
+def test_a_flight_that_has_ended_shows_its_result_and_its_closest_moments(
+    serve, open_page, goals, tmp_path
+):
+    report = tmp_path / "report.html"
+    options = ["--web", "--rate", "0", "--goals", goals, "--report", report]
+    served = serve(command=[*QUAD, "fly", *map(str, options)])
+    flight = Driver(open_page(served.url))
+    card = flight.at("result")
+    expect(card).to_contain_text("Mission succeeded", timeout=200000)
     expect(flight.at("flight-state")).to_have_text("ended")
+    summary = flight.page.request.get(f"{served.url}summary.json").json()
+    assert summary["success"]
+    for text in (
+        "2 of 2",
+        f"{summary['sim_time_s']:.1f} s",
+        f"{summary['min_separation_m']:.2f} m",
+        f"{min(robot['min_clearance_m'] for robot in summary['robots']):.2f} m",
+    ):
+        expect(card).to_contain_text(text)
+    history = "getElement(document.querySelector('.quad-charts')).view._history"
+    least_m = flight.page.evaluate(f"() => Math.min(...{history}.band(0).least)")
+    assert least_m == pytest.approx(summary["min_separation_m"], abs=0.01)
+    assert flight.page.evaluate(f"() => {history}.times.length") > 5 * summary["sim_time_s"]
+    with flight.page.context.expect_page() as opened:
+        flight.at("result-report").click()
+    expect(opened.value.locator("h1")).to_contain_text("2 quadcopters")
+    flight.at("result-again").click()
+    expect(card).to_be_hidden()
 
 
 def test_goals_are_edited_before_the_flight(serve, open_page, goals, tmp_path):

@@ -57,6 +57,13 @@ def test_robots_are_selected_in_both_views_and_followed(driver):
     expect(driver.at("card-name")).to_contain_text("1")
     driver.at("mode").get_by_text("2D").click()
     driver.at("play").click()
+    driver.at("robots-row-0").click()
+    driver.at("robots-row-1").click()
+    driver.wait_for_arena("arena.fleet.selected?.index === 1")
+    assert not driver.arena("_isFollowing")  # all of the arena is seen
+    for _ in range(3):
+        driver.page.get_by_title("Zoom in").click()
+    driver.at("robots-row-0").click()
     driver.at("robots-row-1").click()
     # Where the robot is drawn does not change while it moves; panels may cover the middle.
     height = "arena.view.viewport?.height / 2"
@@ -109,6 +116,11 @@ def test_the_selected_robot_is_told_and_its_parameters_change(driver, server):
 def test_stop_all_events_and_layers(driver, server):
     driver.at("stop-all").click()
     driver.says("every robot hovers")
+    expect(driver.at("flight-state")).to_have_text("stopped")
+    expect(driver.at("play")).to_have_text(re.compile("Resume$"))
+    driver.at("play").click()
+    expect(driver.at("flight-state")).to_have_text("running")
+    expect(driver.at("play")).not_to_have_text(re.compile("Resume"))
     driver.select(0)
     field = driver.at("goal-x")
     field.click()
@@ -116,7 +128,8 @@ def test_stop_all_events_and_layers(driver, server):
     expect(field).to_have_value("1.5")
     driver.at("deselect").click()
     driver.page.keyboard.press(".")
-    until(driver.page, lambda: server.calls() == ["('stop_all',)"] * 2)
+    stop, start = "('stop_all',)", "('start',)"
+    until(driver.page, lambda: server.calls() == [stop, start, stop])
     driver.at("dock-events").click()
     expect(driver.at("events")).to_contain_text("every robot hovers")
     driver.at("events-text").fill("mission")

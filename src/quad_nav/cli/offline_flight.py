@@ -49,6 +49,9 @@ class FlightPage(Protocol):
     def observer(self) -> FlightObserver:
         """Return what shows the next flight."""
 
+    def show_result(self, summary: MissionSummary, report: Optional[Path]) -> None:
+        """Show how the last flight has ended, and its report."""
+
     def wants_flight(self, is_interrupted: Callable[[], bool]) -> bool:
         """Wait until people want another flight; false if there will be none."""
 
@@ -219,6 +222,8 @@ def _fly(
     for line in pictures.write(summary, overview if quiet else ""):
         if not quiet:
             echo(line, err=True)
+    if page is not None:
+        page.show_result(summary, outputs.path("--report"))
     if not any(observer.stop_reason for observer in observers):
         outputs.announce_file("--record")
     if summary.reason == INTERRUPTED:

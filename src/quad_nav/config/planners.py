@@ -7,7 +7,7 @@ To add a planner, add a line to ``GLOBAL_PLANNERS`` or ``LOCAL_PLANNERS``, and o
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Dict, Iterable, List, Mapping, Optional
+from typing import Any, Dict, Iterable, List, Mapping, Optional, Tuple
 
 from quad_nav.config.fixes import with_fixes
 from quad_nav.config.notes import CAUTION, IGNORED, RENAMED, UNSUPPORTED, UNUSED, Notes, join
@@ -143,6 +143,11 @@ SLOTS: Dict[str, Slot] = {
 _OTHER_PLANNERS = ("TebLocalPlannerROS", "EBandPlannerROS", "DWBLocalPlanner", "SBPLLatticePlanner")
 _DEFAULT_RATE_HZ = 20.0
 _NAMED = 4  # parameters in a line about many
+
+
+def planner_names(namespace: str, parameter: str) -> Tuple[str, ...]:
+    """Return the planners that a parameter may name; () if it does not name one."""
+    return tuple(SLOTS[parameter].types) if not namespace and parameter in SLOTS else ()
 
 
 def planner_keys(tree: Mapping[str, Any]) -> List[str]:

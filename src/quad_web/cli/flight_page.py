@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import time
 import webbrowser
-from typing import Callable, List
+from pathlib import Path
+from typing import Callable, List, Optional
 
 from quad_nav.cli.options import echo
+from quad_nav.mission.summary import MissionSummary
 from quad_nav.offline.flight import FlightObserver
 from quad_web.offline.actions import STARTED_AGAIN, FlightActions
 from quad_web.offline.view import WebView
-from quad_web.process import ServerProcess
+from quad_web.process import Batch, ServerProcess
 from quad_web.server import Urls, WebOptions
+from quad_web.view.result import result_item
 
 _LOOKS_EVERY_S = 0.2
+_TAKES_WITHIN_S = 5.0
 
 
 class FlightPage:
@@ -36,6 +41,14 @@ class FlightPage:
     def observer(self) -> FlightObserver:
         """Return what shows the next flight."""
         return WebView(self._process, self._actions)
+
+    def show_result(self, summary: MissionSummary, report: Optional[Path]) -> None:
+        """Show how the last flight has ended, and its report."""
+        end_s = time.monotonic() + _TAKES_WITHIN_S
+        while self._process.is_alive and not self._process.can_take and time.monotonic() < end_s:
+            self._process.wait(_LOOKS_EVERY_S)
+        if self._process.can_take:
+            self._process.send(Batch([result_item(summary, report)]))
 
     def wants_flight(self, is_interrupted: Callable[[], bool]) -> bool:
         """Wait until people want another flight; false after Ctrl-C, or if the server has ended."""

@@ -10,6 +10,7 @@ import numpy as np
 from quad_nav import config
 from quad_nav.config import Configuration
 from quad_nav.config.files import below
+from quad_nav.config.planners import planner_names
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.goal import MAX_COORDINATE_M
@@ -230,7 +231,8 @@ def parameter_views(configuration: Configuration) -> List[ParameterView]:
                 start[one.name],
                 one.low,
                 one.high,
-                tuple((choice.name, choice.value) for choice in one.choices),
+                tuple((choice.name, choice.value) for choice in one.choices)
+                or tuple((name, name) for name in planner_names(namespace, one.name)),
                 one.description,
             )
             for one in parameters

@@ -53,14 +53,15 @@ class FlightItems:
         self._robots = range(len(self._names))
         self._contacts: List[Contact] = []
         self._failed: Dict[int, Set[int]] = {robot: set() for robot in self._robots}
-        self._trails, self._obstacles = Trails(), ObstacleItems()
+        self._trails, self._obstacles, self._samples = Trails(), ObstacleItems(), rows.Samples()
         self._next_track_s = -math.inf
         self._has_static = self._has_goals = False
         self._shown: Set[str] = set()  # keys of items that may disappear
         self._has_contacts = True
 
     def track(self, flight: Flight) -> None:
-        """Add the robots' positions to their trails; called at each odometry."""
+        """Add the robots' positions to samples and trails; called at each odometry."""
+        self._samples.add(flight.now_s, flight.states.bodies.rows)
         if flight.now_s < self._next_track_s:
             return
         self._next_track_s = flight.now_s + TRACK_PERIOD_S
@@ -154,7 +155,11 @@ class FlightItems:
             ),
             poses,
             *self._obstacles.items(setup.scene, moving),
-            samples,
+            *self._samples.take(
+                setup.robot_radius_m,
+                flight.simulation.movers.flight_surface_distances_m,
+                cycles_s,
+            ),
             yields,
             *([status] if views else []),
         ]

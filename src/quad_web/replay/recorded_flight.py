@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import bisect
+import math
 import re
 import time
+from functools import cached_property
 from pathlib import Path
 from typing import Callable, Dict, Hashable, Iterable, List, Mapping, Optional, Tuple
 
@@ -39,6 +41,7 @@ from quad_web.view.state import Item
 
 SHOWN_FOR_S = 1.0
 """Scans, local plans and tracks are shown for so long, unless there are newer ones."""
+_TIMES_AT_ONCE = 200
 _MARGIN_M = 0.05  # of peers, where the recording has no parameters
 _LAYERS = {
     "scan": (r"/scan([0-9]{1,4})", "sensor_msgs/LaserScan"),
@@ -104,6 +107,50 @@ class RecordedFlight:
         """The items that stay the same."""
         items = [robots_item(self.names, self._trace.robot_radius_m)]
         return items + ([scene_item(self._trace.scene)] if self._trace.scene else [])
+
+    @cached_property
+    def result(self) -> Item:
+        """The item ``result``, of the whole recording."""
+        trace = self._trace
+        ended = [goal.reached for robot in trace.robots for goal in robot.goals]
+        goals = max(len(ended), sum(len(track.goals) for track in self._tracks))
+        separation_m, clearance_m = self._least_m()
+        is_success = not trace.reason and not trace.contacts and 0 < goals == sum(ended)
+        return Item(
+            "result",
+            {
+                "is_success": is_success,
+                "reason": trace.reason,
+                "reached": sum(ended),
+                "goals": goals,
+                "contacts": len(trace.contacts),
+                "sim_time_s": self.end_s - self.start_s,
+                "wall_time_s": None,
+                "min_separation_m": separation_m,
+                "min_clearance_m": clearance_m,
+                "summary": None,
+                "report": "",
+                "hint": "quad report",
+            },
+        )
+
+    def _least_m(self) -> Tuple[Optional[float], Optional[float]]:
+        """Return the least separation, and the least clearance if nothing moves in the scene."""
+        radius_m, scene = self._trace.robot_radius_m, self._trace.scene
+        gaps_m, clearances_m = [np.inf], [np.inf]
+        times_s = np.arange(self.start_s, self.end_s, rows.SAMPLE_PERIOD_S)
+        for part_s in np.array_split(times_s, 1 + len(times_s) // _TIMES_AT_ONCE):
+            positions = np.array([track.positions(part_s) for track in self._tracks])
+            between_m = rows.gaps_m(positions.swapaxes(0, 1), radius_m)
+            gaps_m.append(np.nanmin(between_m, initial=np.inf))
+            if scene is not None and not scene.moving_shapes:
+                distances_m = scene.flight_surface_distances_m(positions)
+                clearances_m.append(np.nanmin(distances_m, initial=np.inf) - radius_m)
+        separation_m, clearance_m = (float(max(0.0, min(one))) for one in (gaps_m, clearances_m))
+        return (
+            separation_m if math.isfinite(separation_m) else None,
+            clearance_m if math.isfinite(clearance_m) else None,
+        )
 
     def parts(
         self,

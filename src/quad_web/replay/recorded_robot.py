@@ -67,6 +67,16 @@ class RobotTrack:
         velocities = (vx_mps, vy_mps, 0.0, 0.0, 0.0, turn_radps)
         return np.concatenate((position, quaternion, velocities))
 
+    def positions(self, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the positions at some times, float64[t, 2]; NaN before and after the recording."""
+        robot = self.robot
+        return np.column_stack(
+            [
+                np.interp(times_s, robot.times_s, axis_m, left=np.nan, right=np.nan)
+                for axis_m in robot.positions_m[:, :2].T
+            ]
+        )
+
     def pose(self, time_s: float) -> Optional[Pose3D]:
         """Return the pose in ``map`` at a time, None before the first one."""
         x_m, y_m, z_m, *quaternion = self.body(time_s)[:7].tolist()

@@ -12,14 +12,13 @@ import numpy as np
 from quad_nav.errors import InputError
 from quad_web.replay.recorded_flight import RecordedFlight
 from quad_web.view.actions import Actions, Answer
-from quad_web.view.rows import flight_item
+from quad_web.view.rows import SAMPLE_PERIOD_S, flight_item
 from quad_web.view.state import (
     LAYERS,
     OF_ONE_ROBOT,
     FleetState,
     Item,
     robots_by_layer,
-    with_history,
 )
 
 PERIOD_S = 0.1
@@ -59,6 +58,7 @@ class Replay(Actions):
         self._shown: Dict[str, Hashable] = {}  # item -> what identifies its state
         self._told = 0  # events
         self._subject: object = None
+        self._shown_s = 0.0
         self._lacks_history = False
         self._next_told_s = -float("inf")
         self._progress(0.0)
@@ -169,10 +169,14 @@ class Replay(Actions):
         robots_of = robots_by_layer(wanted, range(len(self._flight.names)))
         fast = {layer: robots_of[layer] for layer in LAYERS if layer not in OF_ONE_ROBOT}
         slow = {layer: robots_of[layer] for layer in OF_ONE_ROBOT}
-        self._show([flight_item, *self._flight.present_items(time_s)], fast, time_s)
+        passed = [] if has_jumped else self._samples(self._shown_s, time_s, SAMPLE_PERIOD_S)
+        self._shown_s = time_s
+        self._show([flight_item, *passed, *self._flight.present_items(time_s)], fast, time_s)
+        self._show_result(time_s >= self._flight.end_s)
         self._show([], slow, time_s)
         if self._lacks_history and not has_jumped:  # not while somebody drags the bar
-            self._state.put_all(self._history(time_s))
+            before_s = max(self._flight.start_s, time_s - _HISTORY_S)
+            self._state.put_all(self._samples(before_s, time_s, _HISTORY_PERIOD_S))
         self._lacks_history = has_jumped
 
     def _pass_time(self, is_seen: bool) -> float:
@@ -206,15 +210,15 @@ class Replay(Actions):
         if items or removed:
             self._state.put_all(items, tuple(removed))
 
-    def _history(self, time_s: float) -> List[Item]:
-        """Return the samples of the last minute, the last one with all of them for charts."""
-        first_s = max(self._flight.start_s, time_s - _HISTORY_S)
-        times_s = np.arange(time_s, first_s, -_HISTORY_PERIOD_S)[::-1]
-        if not len(times_s):
-            return []
-        samples = [self._flight.sample(float(at_s)) for at_s in times_s]
-        last = samples.pop()
-        return [*samples, with_history(last, samples)]
+    def _show_result(self, has_ended: bool) -> None:
+        if has_ended is not (self._state.item("result") is not None):
+            items = [self._flight.result] if has_ended else []
+            self._state.put_all(items, () if has_ended else ("result",))
+
+    def _samples(self, after_s: float, time_s: float, period_s: float) -> List[Item]:
+        """Return the samples after a time, up to another one, so far apart."""
+        times_s = np.arange(time_s, max(after_s, time_s - _HISTORY_S), -period_s)[::-1]
+        return [self._flight.sample(float(at_s)) for at_s in times_s]
 
     def _tell_events(self, time_s: float) -> None:
         """Append the events up to a time to the log, each once."""

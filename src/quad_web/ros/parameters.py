@@ -23,6 +23,7 @@ from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest
 
 from quad_nav import config
 from quad_nav.config import Configuration
+from quad_nav.config.planners import planner_names
 from quad_nav.errors import InputError, excerpt
 from quad_nav.sim.scene import BODY_RADIUS_M
 from quad_web.ros.calls import PATIENCE_S, CallFailed, call, in_threads
@@ -197,7 +198,8 @@ def _described(namespace: str, message: ConfigDescription) -> List[ParameterView
                     defaults[one.name],
                     _limit(lows.get(one.name), one.type),
                     _limit(highs.get(one.name), one.type),
-                    _choices(one.edit_method),
+                    _choices(one.edit_method)
+                    or tuple((name, name) for name in planner_names(namespace, one.name)),
                     one.description,
                 )
             )

@@ -2,8 +2,16 @@
  * The arena: joins the link, the views, the tools and what lies over them.
  */
 
+import { inkChanges } from "./colours.js";
 import { EditTool } from "./edit_tool.js";
-import { fleetOf, LARGE_FLEET, OF_ONE_ROBOT, solidAt, STREAMED_LAYERS } from "./fleet.js";
+import {
+  boundsOf,
+  fleetOf,
+  LARGE_FLEET,
+  OF_ONE_ROBOT,
+  solidAt,
+  STREAMED_LAYERS,
+} from "./fleet.js";
 import { Gestures } from "./gestures.js";
 import { Hud, LinkNotice } from "./hud.js";
 import { make, say } from "./dom.js";
@@ -25,7 +33,6 @@ export class View {
     this._role = "watch";
     this._isFollowing = false;
     this._isFitted = false;
-    this._hasMoving = false;
     this._tools = { view: new ViewTool(this), goal: new GoalTool(this), edit: new EditTool(this) };
     this._tool = "view";
     this._mode = "2d";
@@ -68,6 +75,8 @@ export class View {
     this._link.addEventListener("frame", this._onFrame);
     this._onVisible = () => this.requestDraw();
     document.addEventListener("visibilitychange", this._onVisible);
+    this._onInk = () => this._changeInk();
+    inkChanges.addEventListener("change", this._onInk);
     this._resizes = new ResizeObserver(() => this._resize());
     this._resizes.observe(this._root);
   }
@@ -76,6 +85,7 @@ export class View {
   dispose() {
     this._notice.dispose();
     this._resizes.disconnect();
+    inkChanges.removeEventListener("change", this._onInk);
     document.removeEventListener("keydown", this._onEscape, { capture: true });
     document.removeEventListener("visibilitychange", this._onVisible);
     this._link.removeEventListener("frame", this._onFrame);
@@ -92,7 +102,7 @@ export class View {
     if (state.layers !== undefined) {
       this._explainCostmaps(state.layers);
       this._choices.layers = new Set(state.layers);
-      this._updateLegend();
+      this._hud.legend.clear();
     }
     if (state.selected !== undefined) {
       this._choices.selected = state.selected;
@@ -108,7 +118,7 @@ export class View {
       this._setMode(state.mode);
     }
     if (state.following !== undefined) {
-      this._isFollowing = state.following;
+      this._isFollowing = state.following && !this._showsAll();
     }
     this._want();
     this.requestDraw();
@@ -122,10 +132,14 @@ export class View {
     }
   }
 
-  _updateLegend() {
-    const ofView = this._mode === "2d" ? ["map"] : [];
-    const ofScene = this._hasMoving ? ["moving"] : [];
-    this._hud.legend.setLayers(new Set([...this._choices.layers, ...ofView, ...ofScene]));
+  /** Return whether the whole arena is seen, so that there is nothing to follow. */
+  _showsAll() {
+    const { minX, minY, maxX, maxY } = boundsOf(this.fleet);
+    const corners = [[minX, minY], [minX, maxY], [maxX, minY], [maxX, maxY]];
+    return corners.every(([x, y]) => {
+      const [px, py] = this.view.toScreen(x, y, 0);
+      return px >= 0 && py >= 0 && px <= this._root.clientWidth && py <= this._root.clientHeight;
+    });
   }
 
   /** Select a robot (null: none) as the person has clicked it. */
@@ -198,7 +212,7 @@ export class View {
       view.setActive?.(name === this._mode);
     }
     this.view = this._views[this._mode];
-    this._updateLegend();
+    this._hud.legend.clear();
     this._isFitted = false;
     this._resize();
   }
@@ -226,6 +240,15 @@ export class View {
     this._draw();
   }
 
+  /** Draw everything anew: the reader's colour scheme has changed. */
+  _changeInk() {
+    const { "2d": map, ...others } = this._views;
+    Object.values(others).forEach((view) => view.dispose());
+    this._views = { "2d": map };
+    this._hud.legend.clear();
+    this._setMode(this._mode);
+  }
+
   get _isSeen() {
     return !document.hidden && this._root.clientWidth > 0 && this._root.clientHeight > 0;
   }
@@ -244,10 +267,7 @@ export class View {
       this._robotCount = fleet.robots.length;
       this._want();
     }
-    if (this._hasMoving !== fleet.obstacles.length > 0) {
-      this._hasMoving = fleet.obstacles.length > 0;
-      this._updateLegend();
-    }
+    this._hud.legend.update(fleet, this._mode === "2d");
     if (!this._isFitted && (fleet.scene || fleet.robots.length)) {
       view.fit(fleet, this._hud.covered);
       this._isFitted = true;

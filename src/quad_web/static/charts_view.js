@@ -4,9 +4,9 @@
 
 import "echarts";
 
-import { INK } from "./colours.js";
+import { INK, inkChanges, seen } from "./colours.js";
 import { sharedLink } from "./link.js";
-import { layoutOptions, SampleHistory, seriesOptions } from "./samples.js";
+import { emptyOptions, layoutOptions, SampleHistory, seriesOptions } from "./samples.js";
 
 const PERIOD_MS = 500;
 const FULL_SPEED_PERIOD_MS = 1000; // the flight needs the processor
@@ -28,7 +28,9 @@ export class View {
     this._onFrame = () => this._read();
     this._link.addEventListener("frame", this._onFrame);
     this._timer = setInterval(() => this._drawIfDue(), PERIOD_MS);
-    this._resizes = new ResizeObserver(() => this._resize());
+    this._onInk = () => this._resize();
+    inkChanges.addEventListener("change", this._onInk);
+    this._resizes = new ResizeObserver(this._onInk);
     this._resizes.observe(root);
   }
 
@@ -36,6 +38,7 @@ export class View {
   dispose() {
     clearInterval(this._timer);
     this._resizes.disconnect();
+    inkChanges.removeEventListener("change", this._onInk);
     this._link.removeEventListener("frame", this._onFrame);
     this._chart.dispose();
   }
@@ -85,8 +88,9 @@ export class View {
     this._hasNews = false;
     this._drawn_ms = performance.now();
     const colours = this._link.store.get("robots")?.data.colours ?? [];
-    const colourOf = (robot) => colours[robot] ?? INK.limited;
+    const colourOf = (robot) => seen(colours[robot] ?? INK.limited);
     const series = seriesOptions(this._history, this._selected, colourOf);
-    this._chart.setOption({ series }, { replaceMerge: ["series"] });
+    const graphic = emptyOptions(this._history, this._link.store.get("flight")?.data.source);
+    this._chart.setOption({ series, graphic }, { replaceMerge: ["series"] });
   }
 }

@@ -2,10 +2,11 @@
  * Colours of costmaps, robots and marks.
  */
 
-/** Colours of everything that is not a robot. */
-export const INK = {
+const LIGHT = {
   background: "#eef1f5",
   floor: "#ffffff",
+  plate: "#ffffff", // below texts, and in goals to come
+  strong: "#000000", // what colours are mixed with to stand out from the floor
   grid: "#e4e8ee",
   gridStrong: "#cfd6df",
   wall: "#3b4654",
@@ -17,13 +18,64 @@ export const INK = {
   suspect: "#f2bf0d",
   passed: "#aab4c0",
   text: "#1f2933",
-  accent: "#0b63ce",
+  muted: "#55616f",
+  accent: "#0b5cc0",
   fault: "#c62828",
   waits: "#d97706",
   makesRoom: "#7c3aed",
   limited: "#64748b",
   contact: "#d50000",
 };
+
+const DARK = {
+  ...LIGHT,
+  background: "#0f1216",
+  floor: "#1b2027",
+  plate: "#171b21",
+  strong: "#ffffff",
+  grid: "#282f38",
+  gridStrong: "#3b4450",
+  wall: "#8b97a5",
+  solid: "#5d6977",
+  solidEdge: "#98a4b1",
+  movingEdge: "#f0a184",
+  passed: "#7b8794",
+  text: "#e4e9ef",
+  muted: "#a3afbb",
+  accent: "#6fb1ff",
+  fault: "#ff6b60",
+  makesRoom: "#a78bfa",
+  limited: "#94a3b8",
+  contact: "#ff5252",
+};
+
+const scheme = matchMedia("(prefers-color-scheme: dark)");
+
+/** Colours of everything that is not a robot, of the reader's colour scheme. */
+export const INK = { ...(scheme.matches ? DARK : LIGHT) };
+
+/** Tells with the event `change` that the colours of `INK` are other ones. */
+export const inkChanges = new EventTarget();
+
+scheme.addEventListener("change", () => {
+  Object.assign(INK, scheme.matches ? DARK : LIGHT);
+  inkChanges.dispatchEvent(new Event("change"));
+});
+
+const LEAST_LUMINANCE = 0.15; // of a robot's colour on the dark floor: a contrast of 3
+const visible = new Map();
+
+/** Return a robot's colour, lighter where the dark floor would hide it. */
+export function seen(colour) {
+  if (INK.strong === LIGHT.strong) {
+    return colour;
+  }
+  if (!visible.has(colour)) {
+    const steps = [0, 0.1, 0.2, 0.3, 0.4, 0.5].map((share) => mix(colour, INK.strong, share));
+    visible.set(colour, steps.find((one) => luminance(one) >= LEAST_LUMINANCE) ?? steps.at(-1));
+  }
+  return visible.get(colour);
+}
 
 const HEX = /^#[0-9a-f]{6}$/i;
 
@@ -48,13 +100,18 @@ export function mix(colour, other, share) {
   return `#${mixed.map((part) => part.toString(16).padStart(2, "0")).join("")}`;
 }
 
-/** Return black or white, whichever is read better on a colour (WCAG's relative luminance). */
+/** Return black or white, whichever is read better on a colour. */
 export function textOn(colour) {
+  return luminance(colour) > 0.36 ? "#000000" : "#ffffff";
+}
+
+/** Return WCAG's relative luminance. */
+function luminance(colour) {
   const [red, green, blue] = parseColour(colour).map((part) => {
     const value = part / 255;
     return value <= 0.03928 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4;
   });
-  return 0.2126 * red + 0.7152 * green + 0.0722 * blue > 0.36 ? "#000000" : "#ffffff";
+  return 0.2126 * red + 0.7152 * green + 0.0722 * blue;
 }
 
 /** Return [red, green, blue, alpha] of an occupancy value, as RViz's costmap scheme has it. */

@@ -5,7 +5,7 @@
 
 import { INK, mix, textOn, withAlpha } from "./colours.js";
 import { added, moved, removed, shifted, turned } from "./goal_list.js";
-import { ahead, disc, drawArrow, drawDashes, tag, write } from "./map_marks.js";
+import { ahead, disc, drawArrow, drawDashes, tag, tagWidth, write } from "./map_marks.js";
 import { ViewTool } from "./tools.js";
 import { nearest } from "./viewport.js";
 
@@ -182,6 +182,7 @@ export class EditTool extends ViewTool {
       const look = { colour, isCurrent: i === this._current, fault: editing.faults[i] ?? "" };
       drawEdited(context, view, goal, i, places[i], look);
     });
+    editing.goals.forEach((_, i) => drawFault(context, view, fleet, places[i], editing.faults[i]));
   }
 }
 
@@ -191,17 +192,34 @@ function drawEdited(context, view, goal, index, at, { colour, isCurrent, fault }
   const ink = fault ? INK.fault : colour;
   const handle = handleOf(view, goal);
   if (goal.yaw === null) {
-    disc(context, ...handle, 5, "#ffffff", withAlpha(ink, 0.45), 1.5);
+    disc(context, ...handle, 5, INK.plate, withAlpha(ink, 0.45), 1.5);
   } else {
     drawArrow(context, at, handle, ink, 2.5);
   }
   if (isCurrent) {
     disc(context, ...at, RADIUS_PX + 5, withAlpha(INK.accent, 0.2), INK.accent, 2);
   }
-  disc(context, ...at, RADIUS_PX, fault ? INK.fault : "#ffffff", ink, 3);
-  const text = fault ? textOn(INK.fault) : mix(colour, "#000000", 0.4);
+  disc(context, ...at, RADIUS_PX, fault ? INK.fault : INK.plate, ink, 3);
+  const text = fault ? textOn(INK.fault) : mix(colour, INK.strong, 0.4);
   write(context, String(index + 1), ...at, 12, text);
-  if (fault) {
-    tag(context, fault, at[0], at[1] + 26, INK.fault);
+}
+
+/** Write a fault beside its goal, within the picture, where it covers no robot. */
+function drawFault(context, view, fleet, [px, py], fault) {
+  if (!fault) {
+    return;
   }
+  const half = tagWidth(context, fault) / 2;
+  const most = context.canvas.clientWidth - half - 4;
+  const aside = half + RADIUS_PX + 6;
+  const robots = fleet.robots.map((robot) => [
+    ...view.toScreen(robot.x, robot.y, robot.z),
+    view.reachOf(robot),
+  ]);
+  const places = [[0, 26], [0, -26], [aside, 0], [-aside, 0], [0, 44], [0, -44]].map(
+    ([dx, dy]) => [Math.max(half + 4, Math.min(px + dx, most)), py + dy],
+  );
+  const isFree = ([x, y]) =>
+    robots.every(([rx, ry, r]) => Math.abs(rx - x) > half + r || Math.abs(ry - y) > 8 + r);
+  tag(context, fault, ...(places.find(isFree) ?? places[0]), INK.fault);
 }

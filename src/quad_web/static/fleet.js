@@ -2,7 +2,7 @@
  * What both views draw: one plain object for each thing, made from the items of the store.
  */
 
-import { INK } from "./colours.js";
+import { INK, seen } from "./colours.js";
 
 /** Layers that the server sends on request, as in `view/state.py`. */
 export const STREAMED_LAYERS = [
@@ -22,12 +22,10 @@ export const LARGE_FLEET = 20;
 /** Those of them that are shown of the selected robot only. */
 export const OF_ONE_ROBOT = ["global_costmap", "local_costmap"];
 
-/** Colours of the kinds of yields. */
-export const YIELD_COLOURS = {
-  waits: INK.waits,
-  "makes room": INK.makesRoom,
-  limited: INK.limited,
-};
+/** Return the colour of a kind of yields. */
+export function yieldColour(kind) {
+  return { waits: INK.waits, "makes room": INK.makesRoom }[kind] ?? INK.limited;
+}
 
 /** Seconds that a contact stays marked with its time; afterwards its cross is faint. */
 const CONTACT_FRESH_S = 20;
@@ -50,8 +48,8 @@ const DEFAULT_RADIUS_M = 0.3;
 export function fleetOf(store, choices) {
   const scene = store.get("scene")?.data ?? null;
   const looks = store.get("robots")?.data ?? { colours: [], names: [], radius_m: DEFAULT_RADIUS_M };
-  const colourOf = (robot) => looks.colours[robot] ?? INK.limited;
-  const robots = robotsOf(store, looks);
+  const colourOf = (robot) => seen(looks.colours[robot] ?? INK.limited);
+  const robots = robotsOf(store, looks, colourOf);
   const shown = (layer) => choices.layers.has(layer);
   const polylines = (kind) =>
     shown(kind)
@@ -84,7 +82,7 @@ export function fleetOf(store, choices) {
 }
 
 /** Robots by number; those without a pose are left out. */
-function robotsOf(store, looks) {
+function robotsOf(store, looks, colourOf) {
   const pose = store.get("poses")?.arrays.pose;
   const rows = new Map((store.get("status")?.data.rows ?? []).map((row) => [row.robot, row]));
   const robots = new Map();
@@ -98,7 +96,7 @@ function robotsOf(store, looks) {
       robots.set(index, {
         index,
         name: looks.names[index] ?? String(index),
-        colour: looks.colours[index] ?? INK.limited,
+        colour: colourOf(index),
         radius: looks.radius_m || DEFAULT_RADIUS_M,
         state: rows.get(index)?.state ?? "",
         ...{ x, y, z, roll, pitch, yaw },
@@ -149,7 +147,7 @@ function yieldsOf(store, robots) {
       peer: robots.get(peer) ?? null,
       kind,
       hold,
-      colour: YIELD_COLOURS[kind] ?? INK.limited,
+      colour: yieldColour(kind),
     }))
     .filter(({ robot }) => robot);
 }

@@ -8,7 +8,7 @@ import { Legend } from "./legend.js";
 import { formatLength, roundLength } from "./viewport.js";
 
 const SCALE_BAR_PX = 120;
-const WIDE_PX = 700; // narrower arenas begin with the legend closed
+const WIDE_PX = 700; // narrower arenas begin with the legend folded
 const TOOLBAR_PX = 46; // height of the page's own toolbar
 const NOTE_MS = 6000;
 const REFUSED =
@@ -66,7 +66,7 @@ export class Hud {
   _toggleLegend() {
     const isOpen = this.legend.toggle();
     this._legendButton.setAttribute("aria-pressed", String(isOpen));
-    this._covers?.();
+    this._covers?.(); // which draws, and fills the legend
   }
 
   /** Pixels that panels cover on each side. */

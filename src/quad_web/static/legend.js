@@ -4,7 +4,7 @@
 
 import { costColour, INK, mix } from "./colours.js";
 import { make } from "./dom.js";
-import { YIELD_COLOURS } from "./fleet.js";
+import { levelOf, yieldColour } from "./fleet.js";
 import {
   drawArrow,
   drawContacts,
@@ -14,7 +14,7 @@ import {
   GOAL_SIZES,
 } from "./map_marks.js";
 import { drawPaths, drawScans } from "./map_paths.js";
-import { drawRobot } from "./map_robots.js";
+import { drawRobot, troubleOf } from "./map_robots.js";
 import { drawObstacles, drawSolids } from "./map_scene.js";
 import { Viewport } from "./viewport.js";
 
@@ -109,14 +109,14 @@ function costs(first, last) {
 function arrow(kind) {
   return (context) => {
     context.setLineDash(kind === "limited" ? [2, 4] : [7, 4]);
-    drawArrow(context, [3, HEIGHT / 2], [WIDTH - 3, HEIGHT / 2], YIELD_COLOURS[kind]);
+    drawArrow(context, [3, HEIGHT / 2], [WIDTH - 3, HEIGHT / 2], yieldColour(kind));
     context.setLineDash([]);
   };
 }
 
 function cell(context) {
   context.setLineDash([5, 4]);
-  context.strokeStyle = mix(COLOUR, "#ffffff", 0.3);
+  context.strokeStyle = mix(COLOUR, INK.plate, 0.3);
   context.strokeRect(4, 4, WIDTH - 8, HEIGHT - 8);
 }
 
@@ -124,73 +124,89 @@ const contact = (context) =>
   drawContacts(context, toScreen, [{ x: 0, y: 0, time_s: 0, isFresh: false }]);
 const hold = (context) => drawCross(context, WIDTH / 2, HEIGHT / 2, 6, INK.makesRoom, 3);
 
-/**
- * Layer ("" is always shown, "map" in the map view only), what it is, and a function that draws a
- * sample.
- */
+const isGoal = (state) => (fleet) => fleet.goals.some((one) => one.state === state);
+const isTrack = (kind) => (fleet) => fleet.tracks.some((one) => one.kind === kind);
+const isYield = (kind) => (fleet) => fleet.yields.some((one) => one.kind === kind);
+const has = (part) => (fleet) => fleet[part].length > 0;
+const isSolid = (level) => ({ isMap, scene, altitude }) =>
+  isMap && Boolean(scene?.solids.some((one) => levelOf(one, altitude) === level));
+
+/** What it is, a function that draws a sample, and one that finds it in a fleet. */
 const ENTRIES = [
-  ["", "Quadcopter: white nose ahead, dot leans with it", robot],
-  ["", "Recovering; lost or stopped", troubled],
-  ["goals", "Active goal with its yaw", goal("active", 0)],
-  ["goals", "Goal to come", goal("pending", null)],
-  ["goals", "Goal reached", goal("reached", null)],
-  ["goals", "Goal failed", goal("failed", null)],
-  ["trail", "Trail", path("trails")],
-  ["plan", "Global plan", path("plans")],
-  ["local_plan", "Local plan", path("localPlans")],
-  ["scan", "LIDAR points", scan],
-  ["cell", "Voronoi cell", cell],
-  ["track", "Tracked obstacle; the line ends where it is in 1 s", track("seen")],
-  ["track", "Tracked, but hidden: predicted", track("hidden")],
-  ["track", "Suspect: may move", track("suspect")],
-  ["yields", "Waits for the other", arrow("waits")],
-  ["yields", "Makes room for the other", arrow("makes room")],
-  ["yields", "Place where it will hold", hold],
-  ["yields", "Limited by the other", arrow("limited")],
-  ["contacts", "Contact", contact],
-  ["costmap", "Cost: low to high", costs(1, 98)],
-  ["costmap", "Inscribed: the centre collides", costs(99, 99)],
-  ["costmap", "Lethal: an obstacle", costs(100, 100)],
-  ["costmap", "Unknown", costs(-1, -1)],
-  ["moving", "Moving obstacle", moving({ outline: BOX })],
-  ["moving", "Person: the tip is ahead", moving({ outline: DISC, reach: 9, hasHeading: true })],
-  ["map", "Obstacle at the flying altitude", solid(0, 2, true)],
-  ["map", "Obstacle below it", solid(0, 0.5, false)],
-  ["map", "Obstacle above it", solid(1.5, 0.5, false)],
+  ["Quadcopter: white nose ahead, dot leans with it", robot, has("robots")],
+  ["Recovering; lost or stopped", troubled, (fleet) => fleet.robots.some(troubleOf)],
+  ["Active goal with its yaw", goal("active", 0), isGoal("active")],
+  ["Goal to come", goal("pending", null), isGoal("pending")],
+  ["Goal reached", goal("reached", null), isGoal("reached")],
+  ["Goal failed", goal("failed", null), isGoal("failed")],
+  ["Trail", path("trails"), has("trails")],
+  ["Global plan", path("plans"), has("plans")],
+  ["Local plan", path("localPlans"), has("localPlans")],
+  ["LIDAR points", scan, has("scans")],
+  ["Voronoi cell", cell, has("cells")],
+  ["Tracked obstacle; the line ends where it is in 1 s", track("seen"), isTrack("seen")],
+  ["Tracked, but hidden: predicted", track("hidden"), isTrack("hidden")],
+  ["Suspect: may move", track("suspect"), isTrack("suspect")],
+  ["Waits for the other", arrow("waits"), isYield("waits")],
+  ["Makes room for the other", arrow("makes room"), isYield("makes room")],
+  ["Place where it will hold", hold, (fleet) => fleet.yields.some((one) => one.hold)],
+  ["Limited by the other", arrow("limited"), isYield("limited")],
+  ["Contact", contact, has("contacts")],
+  ["Cost: low to high", costs(1, 98), has("costmaps")],
+  ["Inscribed: the centre collides", costs(99, 99), has("costmaps")],
+  ["Lethal: an obstacle", costs(100, 100), has("costmaps")],
+  ["Unknown", costs(-1, -1), has("costmaps")],
+  [
+    "Moving obstacle",
+    moving({ outline: BOX }),
+    (fleet) => fleet.obstacles.some((one) => !one.person),
+  ],
+  [
+    "Person: the tip is ahead",
+    moving({ outline: DISC, reach: 9, hasHeading: true }),
+    (fleet) => fleet.obstacles.some((one) => one.person),
+  ],
+  ["Obstacle at the flying altitude", solid(0, 2, true), isSolid("across")],
+  ["Obstacle below it", solid(0, 0.5, false), isSolid("low")],
+  ["Obstacle above it", solid(1.5, 0.5, false), isSolid("high")],
 ];
 
-/** A panel with the entries of the shown layers. */
+/** A panel with what is, or was, in the arena since it was opened. */
 export class Legend {
   constructor() {
-    this.element = make("div", { class: "quad-legend", "aria-label": "Legend", hidden: true });
-    this._layers = new Set();
+    const name = { role: "region", "aria-label": "Legend", tabindex: 0 };
+    this.element = make("div", { class: "quad-legend", ...name, hidden: true });
+    this._entries = new Set();
   }
 
   /** Open or close it; return whether it is open. */
   toggle() {
     this.element.hidden = !this.element.hidden;
-    this._fill();
+    this.clear();
     return !this.element.hidden;
   }
 
-  /** Show the entries of these layers. */
-  setLayers(layers) {
-    this._layers = layers;
-    this._fill();
+  /** Begin anew, as with other layers or colours. */
+  clear() {
+    this._entries.clear();
+    this.element.replaceChildren();
   }
 
-  _fill() {
+  /** Add what is new in a fleet; `isMap` in the map view. */
+  update(fleet, isMap) {
     if (this.element.hidden) {
       return;
     }
-    const hasCosts = this._layers.has("global_costmap") || this._layers.has("local_costmap");
-    const isShown = (layer) =>
-      !layer || (layer === "costmap" ? hasCosts : this._layers.has(layer));
-    this.element.replaceChildren(
-      ...ENTRIES.filter(([layer]) => isShown(layer)).map(([, text, draw]) =>
-        make("div", { class: "quad-legend-entry" }, sample(draw), text),
-      ),
-    );
+    const place = { ...fleet, isMap };
+    const found = ENTRIES.filter((entry) => !this._entries.has(entry) && entry[2](place));
+    if (found.length) {
+      found.forEach((entry) => this._entries.add(entry));
+      this.element.replaceChildren(
+        ...ENTRIES.filter((entry) => this._entries.has(entry)).map(([text, draw]) =>
+          make("div", { class: "quad-legend-entry" }, sample(draw), text),
+        ),
+      );
+    }
   }
 }
 

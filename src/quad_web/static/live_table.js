@@ -32,10 +32,12 @@ export default {
     <q-table ref="table" class="live-table" flat dense square virtual-scroll hide-pagination
       binary-state-sort row-key="key" :virtual-scroll-item-size="30"
       :rows="shown" :columns="sortable" v-model:pagination="pagination"
-      :rows-per-page-options="[0]" :no-data-label="empty">
+      :rows-per-page-options="[0]" :no-data-label="empty" @virtual-scroll="scrolled">
       <template v-slot:body="props">
         <q-tr :props="props" :class="rowClasses(props.row)" :data-key="props.row.key"
-          :data-testid="testid + '-row-' + props.row.key" @click="$emit('pick', props.row.key)">
+          :data-testid="testid + '-row-' + props.row.key" @click="$emit('pick', props.row.key)"
+          :data-index="props.pageIndex" :tabindex="tabindex(props.pageIndex)"
+          @focus="current = props.pageIndex" @keydown="key($event, props)">
           <q-td v-for="column in props.cols" :key="column.name" :props="props"
             :class="'cell-' + column.kind" :title="hint(column, props.row)">
             <template v-if="column.kind === 'robot'"><span v-if="props.row.colour" class="dot"
@@ -57,6 +59,7 @@ export default {
     columns: Array,
     testid: String,
     empty: String,
+    picks: Boolean,
     follow: Boolean,
     limit: Number,
     sort: Object,
@@ -65,6 +68,7 @@ export default {
     return {
       rows: [],
       selected: null,
+      current: 0, // place of the row that Tab reaches
       wanted: { text: "", equal: {} },
       pagination: { rowsPerPage: 0, ...this.sort },
     };
@@ -77,7 +81,45 @@ export default {
       return this.rows.filter((row) => matches(row, this.wanted));
     },
   },
+  mounted() {
+    if (!this.picks) {
+      this.$el.querySelector(".q-table__middle").tabIndex = 0; // arrows scroll it
+    }
+  },
   methods: {
+    /** One row that can be picked is in the order of Tab; arrows lead to the others. */
+    tabindex(place) {
+      return this.picks ? (place === this.current ? 0 : -1) : undefined;
+    },
+    key(event, { row, pageIndex }) {
+      const last = this.shown.length - 1;
+      const places = { ArrowDown: pageIndex + 1, ArrowUp: pageIndex - 1, Home: 0, End: last };
+      if (!this.picks || event.target !== event.currentTarget) {
+        return;
+      }
+      if (event.key === "Enter" || event.key === " ") {
+        this.$emit("pick", row.key);
+      } else if (places[event.key] !== undefined) {
+        this.focusRow(Math.max(0, Math.min(places[event.key], last)));
+      } else {
+        return;
+      }
+      event.preventDefault();
+    },
+    /** Focus a row; one out of view is there only after it was scrolled to. */
+    async focusRow(place) {
+      const line = () => this.$el.querySelector(`[data-index="${place}"]`);
+      if (!line()) {
+        this.$refs.table.scrollTo(place);
+        await new Promise(requestAnimationFrame);
+        await this.$nextTick();
+      }
+      line()?.focus();
+    },
+    /** Keep the row that Tab reaches among those that are there. */
+    scrolled({ from, to }) {
+      this.current = Math.max(from, Math.min(this.current, to));
+    },
     /** Change cells of rows, append new rows, remove others. */
     patch(changed, removed) {
       const isAtEnd = this.isAtEnd();
@@ -103,6 +145,7 @@ export default {
       this.selected = key;
       const rows = this.$refs.table.filteredSortedRows ?? this.shown;
       const place = rows.findIndex((row) => row.key === key);
+      this.current = Math.max(0, place);
       const line = this.$el.querySelector(`[data-key="${CSS.escape(String(key))}"]`);
       if (place >= 0 && !line) {
         this.$refs.table.scrollTo(place, "center");

@@ -80,12 +80,12 @@ export function drawGoal(context, toScreen, goal, size, isFaint) {
     drawArrow(context, [px, py], tip, goal.colour, 2.5);
   }
   const edge = size.font ? 2 : 1.5;
-  disc(context, px, py, radius, isActive ? goal.colour : "#ffffff", goal.colour, edge);
+  disc(context, px, py, radius, isActive ? goal.colour : INK.plate, goal.colour, edge);
   if (isActive) {
     disc(context, px, py, radius + 3, "transparent", goal.colour, 1.5);
   }
   if (size.font) {
-    const ink = isActive ? textOn(goal.colour) : mix(goal.colour, "#000000", 0.35);
+    const ink = isActive ? textOn(goal.colour) : mix(goal.colour, INK.strong, 0.35);
     write(context, String(goal.index + 1), px, py, size.font + (isActive ? 1 : 0), ink);
   }
   if (goal.state === "failed") {
@@ -190,7 +190,7 @@ export function drawContacts(context, toScreen, contacts) {
 
 /** Draw a diagonal cross with a light edge. */
 export function drawCross(context, px, py, radius, colour, width = 2.5) {
-  for (const [thickness, ink] of [[width + 2, "#ffffff"], [width, colour]]) {
+  for (const [thickness, ink] of [[width + 2, INK.plate], [width, colour]]) {
     context.beginPath();
     context.moveTo(px - radius, py - radius);
     context.lineTo(px + radius, py + radius);
@@ -222,13 +222,18 @@ export function write(context, text, px, py, size, ink) {
   context.fillText(text, px, py + 0.5);
 }
 
-/** Write a text on a white plate. */
-export function tag(context, text, px, py, ink) {
+/** Return how wide the plate of a text is. */
+export function tagWidth(context, text) {
   context.font = `600 11px ${FONT}`;
-  const width = context.measureText(text).width + 8;
+  return context.measureText(text).width + 8;
+}
+
+/** Write a text on a plate. */
+export function tag(context, text, px, py, ink) {
+  const width = tagWidth(context, text);
   context.beginPath();
   context.roundRect(px - width / 2, py - 8, width, 16, 4);
-  context.fillStyle = "rgba(255,255,255,0.92)";
+  context.fillStyle = withAlpha(INK.plate, 0.92);
   context.fill();
   write(context, text, px, py, 11, ink);
 }

@@ -2,7 +2,7 @@
  * Map view: cells, trails, plans and LIDAR points.
  */
 
-import { mix, withAlpha } from "./colours.js";
+import { INK, mix, withAlpha } from "./colours.js";
 
 const MOST_POINTS = 12000; // of all LIDARs together; beyond, every second, third, ... is drawn
 
@@ -33,7 +33,7 @@ export function drawPaths(context, viewport, { trails, plans, localPlans, select
     line(context, viewport, path, withAlpha(path.colour, isFaded(path) ? 0.55 : 1), 2);
   }
   for (const path of localPlans) {
-    const dark = mix(path.colour, "#000000", 0.45);
+    const dark = mix(path.colour, INK.strong, 0.45);
     line(context, viewport, path, withAlpha(dark, isFaded(path) ? 0.6 : 1), 3.5);
   }
 }

@@ -11,7 +11,12 @@ const LEAST_RADIUS_PX = 8;
 const ICON_BELOW_PX = 11; // drawn as a dart instead of with rotors
 const TILT_FROM_PX = 13;
 const FULL_TILT = 0.35; // sine of the tilt that moves the mark to the hull
-export const FAULTY = { lost: INK.fault, stopped: INK.fault, recovering: INK.waits };
+const RINGS_PX = [[7.5, 3], [4.5, 3]]; // beyond the hull, and width, of the selected robot's
+
+/** Return the colour of a robot in trouble, undefined without any. */
+export function troubleOf({ state }) {
+  return { lost: INK.fault, stopped: INK.fault, recovering: INK.waits }[state];
+}
 
 const NOSE = [[0.78, 0], [0.34, 0.2], [0.34, -0.2]];
 const DART = [[0.8, 0], [-0.55, 0.55], [-0.25, 0], [-0.55, -0.55]];
@@ -26,7 +31,7 @@ export function drawRobot(context, viewport, robot, isSelected) {
   const [px, py] = viewport.toScreen(robot.x, robot.y);
   const radius = drawnRadius(robot, viewport.scale);
   if (isSelected) {
-    disc(context, px, py, radius + 6, withAlpha(INK.accent, 0.16), INK.accent, 2.5);
+    ring(context, px, py, radius);
   }
   drawHull(context, robot, px, py, radius);
   context.save();
@@ -39,9 +44,16 @@ export function drawRobot(context, viewport, robot, isSelected) {
   }
 }
 
+/** A double ring, black and white, which no robot and no state has. */
+function ring(context, px, py, radius) {
+  RINGS_PX.forEach(([beyond, width], i) => {
+    disc(context, px, py, radius + beyond, "transparent", ["#000000", "#ffffff"][i], width);
+  });
+}
+
 /** The hull that collisions are counted with; its colour tells of trouble. */
 function drawHull(context, robot, px, py, radius) {
-  const trouble = FAULTY[robot.state];
+  const trouble = troubleOf(robot);
   const fill = withAlpha(trouble ?? robot.colour, trouble ? 0.25 : 0.1);
   const edge = trouble ?? withAlpha(robot.colour, 0.65);
   disc(context, px, py, radius + (trouble ? 2 : 0), fill, edge, trouble ? 2.5 : 1);
@@ -51,7 +63,7 @@ function drawHull(context, robot, px, py, radius) {
 function drawAirframe(context, radius, colour) {
   const rotor = 0.36 * radius;
   const arm = (radius - rotor) * Math.SQRT1_2;
-  const dark = mix(colour, "#000000", 0.45);
+  const dark = mix(colour, INK.strong, 0.45);
   context.lineCap = "round";
   context.lineWidth = Math.max(1.5, 0.12 * radius);
   context.strokeStyle = dark;
@@ -124,13 +136,12 @@ export function drawNumbers(context, marks) {
     taken.push(box);
     context.beginPath();
     context.roundRect(...box, height / 2);
-    context.fillStyle = isSelected ? INK.accent : colour;
+    context.fillStyle = colour;
     context.fill();
     context.lineWidth = 1.5;
     context.strokeStyle = "#ffffff";
     context.stroke();
-    const ink = textOn(isSelected ? INK.accent : colour);
-    write(context, text, box[0] + width / 2, box[1] + height / 2, size, ink);
+    write(context, text, box[0] + width / 2, box[1] + height / 2, size, textOn(colour));
   }
 }
 

@@ -3,7 +3,7 @@
  * canvas of their own.
  */
 
-import { INK, paintCosts } from "./colours.js";
+import { INK, inkChanges, paintCosts } from "./colours.js";
 import { levelOf, outlineOf } from "./fleet.js";
 import { roundLength, tracePath } from "./viewport.js";
 
@@ -12,9 +12,9 @@ const HATCH_PX = 7;
 const GRID_PX = 60; // about the distance of lines
 
 /** Colours of solids: those at the flying altitude, and the edges of others. */
-const SOLID = { fill: INK.solid, edge: INK.solidEdge, passed: INK.passed };
-const WALL = { ...SOLID, fill: INK.wall };
-const MOVING = { fill: INK.moving, edge: INK.movingEdge, passed: INK.moving };
+const solidLook = () => ({ fill: INK.solid, edge: INK.solidEdge, passed: INK.passed });
+const wallLook = () => ({ ...solidLook(), fill: INK.wall });
+const movingLook = () => ({ fill: INK.moving, edge: INK.movingEdge, passed: INK.moving });
 
 /** Draw the floor and its grid, as far as it is seen. */
 export function drawFloor(context, viewport, scene) {
@@ -64,17 +64,17 @@ export function drawSolids(context, viewport, scene) {
     return;
   }
   for (const solid of scene.solids) {
-    drawSolid(context, viewport, solid, levelOf(solid, scene.altitude_m), SOLID);
+    drawSolid(context, viewport, solid, levelOf(solid, scene.altitude_m), solidLook());
   }
   for (const wall of scene.walls) {
-    drawSolid(context, viewport, wall, levelOf(wall, scene.altitude_m), WALL);
+    drawSolid(context, viewport, wall, levelOf(wall, scene.altitude_m), wallLook());
   }
 }
 
 /** Draw obstacles that move; people who walk have a tip ahead. */
 export function drawObstacles(context, viewport, obstacles, altitude) {
   for (const obstacle of obstacles) {
-    drawSolid(context, viewport, obstacle, levelOf(obstacle, altitude), MOVING);
+    drawSolid(context, viewport, obstacle, levelOf(obstacle, altitude), movingLook());
     if (obstacle.hasHeading) {
       drawHeading(context, viewport, obstacle);
     }
@@ -115,6 +115,7 @@ function drawSolid(context, viewport, solid, level, look) {
 }
 
 let hatchTile = null;
+inkChanges.addEventListener("change", () => (hatchTile = null));
 
 /** Return a pattern of diagonal lines. */
 function hatch(context) {

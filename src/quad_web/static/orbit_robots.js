@@ -5,8 +5,7 @@
 import { mergeGeometries } from "BufferGeometryUtils";
 import * as THREE from "three";
 
-import { INK } from "./colours.js";
-import { FAULTY } from "./map_robots.js";
+import { troubleOf } from "./map_robots.js";
 import { linear } from "./orbit_batches.js";
 
 const ROTOR = 0.36; // radius of a rotor, for a hull of radius 1
@@ -38,11 +37,11 @@ export class Quadcopters {
       for (const { mesh, isOnGround, colourOf } of this._parts) {
         pose.position.set(robot.x, robot.y, isOnGround ? 0.02 : robot.z);
         pose.rotation.set(isOnGround ? 0 : robot.roll, isOnGround ? 0 : robot.pitch, robot.yaw);
-        const isShown = colourOf !== haloColour || robot === selected || FAULTY[robot.state];
+        const isShown = Boolean(colourOf(robot, selected));
         pose.scale.setScalar(isShown ? radius : 0);
         pose.updateMatrix();
         mesh.setMatrixAt(i, pose.matrix);
-        mesh.setColorAt(i, linear(colourOf(robot, selected)));
+        mesh.setColorAt(i, linear(colourOf(robot, selected) ?? robot.colour));
       }
     });
     for (const { mesh } of this._parts) {
@@ -68,7 +67,9 @@ export class Quadcopters {
       this._part(nose(), new THREE.MeshLambertMaterial(), () => "#ffffff"),
       this._part(rotors(), new THREE.MeshBasicMaterial({ ...glass, vertexColors: true }), own),
       this._part(ring(0.96, 1), new THREE.MeshBasicMaterial(glass), own),
-      this._part(ring(1.15, 1.32), new THREE.MeshBasicMaterial(glass), haloColour),
+      this._part(ring(1.08, 1.2), new THREE.MeshBasicMaterial(glass), troubleOf),
+      this._part(ring(1.24, 1.38), new THREE.MeshBasicMaterial(glass), selectedIn("#ffffff")),
+      this._part(ring(1.38, 1.52), new THREE.MeshBasicMaterial(glass), selectedIn("#000000")),
       this._part(new THREE.CircleGeometry(1, 24), new THREE.MeshBasicMaterial(faint), shade, true),
     ];
   }
@@ -84,9 +85,8 @@ export class Quadcopters {
 
 const shade = () => "#000000";
 
-function haloColour(robot, selected) {
-  return robot === selected ? INK.accent : (FAULTY[robot.state] ?? INK.accent);
-}
+/** Return a function with the colour of a part that the selected robot alone has. */
+const selectedIn = (colour) => (robot, selected) => (robot === selected ? colour : undefined);
 
 /** Body and arms, x ahead, within a circle of radius 1. */
 function airframe() {

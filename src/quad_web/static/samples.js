@@ -35,16 +35,13 @@ export class SampleHistory {
     this._rows = [];
   }
 
-  /** Append what an item brings: one sample, and those before it in a connection's first one. */
+  /** Append what an item brings: one sample, and those before it that are new, too. */
   add({ data, arrays }) {
     const { times, history, values } = arrays;
-    if (times) {
-      this._clear(history.shape[1]);
-      const size = history.shape[1] * COLUMNS;
-      times.values.forEach((time_s, i) => {
-        this._append(time_s, history.values.subarray(i * size, (i + 1) * size));
-      });
-    }
+    const size = values.values.length;
+    times?.values.forEach((time_s, i) => {
+      this._append(time_s, history.values.subarray(i * size, (i + 1) * size));
+    });
     this._append(data.time_s, values.values);
   }
 
@@ -66,6 +63,12 @@ export class SampleHistory {
   /** Return one value of one robot over time; NaN where it is unknown. */
   line(robot, column) {
     return this._rows.map((row) => row[COLUMNS * robot + column]);
+  }
+
+  /** Return whether a value is known of no robot at any time. */
+  isEmpty(column) {
+    const isUnknown = (value, i) => i % COLUMNS !== column || Number.isNaN(value);
+    return this._rows.every((row) => row.every(isUnknown));
   }
 
   /** Return the least and the greatest value of all robots over time; NaN where all are unknown. */
@@ -94,7 +97,8 @@ export function layoutOptions(width, height) {
     (i % columns) * cellWidth,
     LEGEND_PX + Math.floor(i / columns) * cellHeight,
   ];
-  const text = { fontFamily: FONT, fontSize: 11, color: "#52606d" };
+  const empty = { type: "text", z: 10, silent: true, invisible: true };
+  const text = { fontFamily: FONT, fontSize: 11, color: INK.muted };
   const legendText = { ...text, fontSize: 12, color: INK.text };
   return {
     animation: false,
@@ -120,6 +124,13 @@ export function layoutOptions(width, height) {
       width: Math.max(cellWidth - 50, 20),
       height: Math.max(cellHeight - 46, 20),
     })),
+    graphic: CHARTS.map((_, i) => ({
+      ...empty,
+      id: `empty${i}`,
+      left: corner(i)[0] + 44,
+      top: corner(i)[1] + cellHeight / 2 - 8,
+      style: { fill: INK.muted, font: `13px ${FONT}` },
+    })),
     xAxis: CHARTS.map((_, i) => ({
       gridIndex: i,
       type: "value",
@@ -143,27 +154,49 @@ export function layoutOptions(width, height) {
   };
 }
 
-/** Return the lines of all charts; that of the selected robot is bold. */
+/** Return the texts in charts without a value, which `source` does not have. */
+export function emptyOptions(history, source) {
+  const text = source === "replay" ? "not recorded" : "not known";
+  return CHARTS.map((_, i) => ({
+    id: `empty${i}`,
+    invisible: !history.isEmpty(i),
+    style: { text },
+  }));
+}
+
+/** Return the lines of all charts; that of the selected robot is bold, one over another dashed. */
 export function seriesOptions(history, selected, colourOf) {
   const isFew = history.count <= FEW_ROBOTS;
   const robots = [...Array(history.count).keys()].filter((i) => isFew || i === selected);
   return CHARTS.flatMap(({ factor }, column) => {
     const place = { xAxisIndex: column, yAxisIndex: column, silent: true };
-    const own = (robot) => ({
-      ...place,
-      type: "line",
-      name: `robot ${robot}`,
-      showSymbol: false,
-      data: points(history.times, history.line(robot, column), factor),
-      color: colourOf(robot),
-      lineStyle: { width: robot === selected ? 3 : 1.5 },
-      z: robot === selected ? 3 : 2,
-    });
+    const lines = robots.map((robot) => history.line(robot, column));
+    const own = (robot, k) => {
+      const isDashed = lines.slice(0, k).some((other) => areSame(other, lines[k]));
+      return {
+        ...place,
+        type: "line",
+        name: `robot ${robot}`,
+        showSymbol: false,
+        data: points(history.times, lines[k], factor),
+        color: colourOf(robot),
+        lineStyle: { width: robot === selected ? 3 : 1.5, type: isDashed ? [6, 6] : "solid" },
+        z: isDashed ? 4 : robot === selected ? 3 : 2,
+      };
+    };
     return [
       ...(isFew ? [] : [bandOptions(place, history, column, factor)]),
       ...robots.map(own),
     ];
   });
+}
+
+const SAME = 0.01; // relative difference of lines that cover each other
+
+/** Return whether two lines cover each other. */
+function areSame(a, b) {
+  const isNear = (x, y) => !(Math.abs(x - y) > SAME * Math.max(Math.abs(x), Math.abs(y)));
+  return a.every((value, i) => Number.isNaN(value) === Number.isNaN(b[i]) && isNear(value, b[i]));
 }
 
 /** A band between the least and the greatest value; where they are unknown, it has gaps. */

@@ -125,7 +125,7 @@ export class GoalTool extends ViewTool {
       const tip = [goal.x + ahead * Math.cos(goal.yaw), goal.y + ahead * Math.sin(goal.yaw)];
       drawArrow(context, at, view.toScreen(...tip), colour, 4);
     }
-    disc(context, ...at, 9, "#ffffff", colour, 4);
+    disc(context, ...at, 9, INK.plate, colour, 4);
     const degrees = goal.yaw === null ? "" : `, ${Math.round((goal.yaw * 180) / Math.PI)}°`;
     const text = `${goal.x.toFixed(2)}, ${goal.y.toFixed(2)} m${degrees}`;
     tag(context, text, at[0], at[1] + 24, INK.text);

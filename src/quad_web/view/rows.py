@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+import collections
 import math
 from dataclasses import dataclass, field
-from typing import Any, Collection, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import (
+    Any,
+    Callable,
+    Collection,
+    Deque,
+    Dict,
+    List,
+    Mapping,
+    Optional,
+    Sequence,
+    Tuple,
+)
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +26,9 @@ from quad_nav.peers.right_of_way import Yield, YieldDecision
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.obstacles import Obstacle
 from quad_nav.sim.scene import Scene
-from quad_web.view.state import Item
+from quad_web.view.state import MAX_SAMPLES, Item
 
+SAMPLE_PERIOD_S = 0.1
 HOVERS_BELOW_MPS = 0.03
 """A robot that is slower hovers."""
 
@@ -174,15 +187,16 @@ def contacts_item(contacts: Sequence[Contact], names: Sequence[str]) -> Item:
 
 
 def gaps_m(positions: NDArray[np.float64], radius_m: float) -> NDArray[np.float64]:
-    """Return the gap between each robot's hull and that of the nearest other one, float64[n].
+    """Return the gap between each robot's hull and that of the nearest other one, float64[..., n].
 
-    Positions are float64[n, 2] in ``map``; NaN of an unknown robot, and without another robot.
+    Positions are float64[..., n, 2] in ``map``; NaN of an unknown robot, and without another robot.
     """
-    offsets = positions[:, None] - positions[None]
+    offsets = positions[..., :, None, :] - positions[..., None, :, :]
     distances_m = np.hypot(offsets[..., 0], offsets[..., 1])
     distances_m[np.isnan(distances_m)] = np.inf
-    np.fill_diagonal(distances_m, np.inf)
-    nearest_m: NDArray[np.float64] = distances_m.min(axis=1, initial=np.inf) - 2.0 * radius_m
+    robots = np.arange(positions.shape[-2])
+    distances_m[..., robots, robots] = np.inf
+    nearest_m: NDArray[np.float64] = distances_m.min(axis=-1, initial=np.inf) - 2.0 * radius_m
     return np.where(np.isfinite(nearest_m), nearest_m, np.nan)
 
 
@@ -220,6 +234,53 @@ def samples_item(
     speeds_mps = np.hypot(poses[:, 6], poses[:, 7])
     cycles_s = unknown if cycles_s is None else cycles_s
     columns = (gaps_m(positions, radius_m), clearances_m, speeds_mps, cycles_s)
+    return _sample(time_s, columns)
+
+
+class Samples:
+    """States of the bodies from one batch of the page to the next, ``SAMPLE_PERIOD_S`` apart.
+
+    A flight at full speed flies seconds between two batches; its closest moments are between them.
+    """
+
+    def __init__(self) -> None:
+        self._times_s: Deque[float] = collections.deque(maxlen=MAX_SAMPLES)
+        self._bodies: Deque[NDArray[np.float64]] = collections.deque(maxlen=MAX_SAMPLES)
+        self._next_s = -math.inf
+
+    def add(self, time_s: float, bodies: NDArray[np.float64]) -> None:
+        """Keep a state, float64[n, 13] as of ``poses_item``, if it is due; it must not change."""
+        if time_s >= self._next_s:
+            self._next_s = time_s + SAMPLE_PERIOD_S - 1e-6
+            self._times_s.append(time_s)
+            self._bodies.append(bodies)
+
+    def take(
+        self,
+        radius_m: float,
+        distances_m: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
+        cycles_s: NDArray[np.float64],
+    ) -> List[Item]:
+        """Return the items ``samples`` of what was kept, and forget it.
+
+        Args:
+            radius_m: Radius of a hull.
+            distances_m: Distances to the nearest surface, see ``Movers``.
+            cycles_s: float64[n], time of the last control cycle.
+        """
+        if not self._times_s:
+            return []
+        times_s, bodies = np.array(self._times_s), np.array(self._bodies)
+        self._times_s.clear()
+        self._bodies.clear()
+        positions, speeds_mps = bodies[..., :2], np.hypot(bodies[..., 7], bodies[..., 8])
+        clearances_m = distances_m(positions.swapaxes(0, 1), times_s).T - radius_m
+        columns = zip(gaps_m(positions, radius_m), clearances_m, speeds_mps)
+        samples = zip(times_s.tolist(), columns)
+        return [_sample(time_s, (*values, cycles_s)) for time_s, values in samples]
+
+
+def _sample(time_s: float, columns: Sequence[NDArray[np.float64]]) -> Item:
     return Item("samples", {"time_s": time_s}, {"values": np.column_stack(columns).astype("f4")})
 
 

@@ -9,6 +9,8 @@ Keys are the name of a kind, or kind and robot as in ``scan/3``:
 key                       data                                arrays
 ========================  ==================================  =====================================
 ``flight``                source, title, state, time_s, ...
+``result``                how the flight has ended, see
+                          ``view.result``
 ``scene``                 size, altitude, walls, solids,
                           moving: solids that move
 ``robots``                names, colours, radius_m
@@ -24,10 +26,9 @@ key                       data                                arrays
 ``contacts``              contacts: time_s, robot, other,
                           x, y
 ``samples``               time_s                              values f4[n, 4]: gap, clearance,
-                                                              speed, cycle; the first one that a
-                                                              client gets also has the samples
-                                                              before it: times f8[t] and
-                                                              history f4[t, n, 4]
+                                                              speed, cycle; and the samples before
+                                                              it that the client lacks: times f8[t]
+                                                              and history f4[t, n, 4]
 ``trail/i``                                                   points f4[k, 2]
 ``plan/i``                                                    points f4[k, 2]
 ``local_plan/i``                                              points f4[k, 2]
@@ -182,7 +183,7 @@ class FleetState:
         self._clients = itertools.count()
         self._events: Deque[Event] = collections.deque(maxlen=MAX_EVENTS)
         self._event_count = 0
-        self._samples: Deque[Item] = collections.deque(maxlen=MAX_SAMPLES)
+        self._samples: Deque[Tuple[int, Item]] = collections.deque(maxlen=MAX_SAMPLES)
         self._listeners: Tuple[Callable[[], None], ...] = ()
 
     # -- written by the source -------------------------------------------------------
@@ -208,11 +209,11 @@ class FleetState:
     def _add_sample(self, item: Item) -> None:
         """Keep it; a jump back in time or another number of robots drops what does not fit."""
         samples, shape = self._samples, item.arrays["values"].shape
-        if samples and samples[-1].arrays["values"].shape != shape:
+        if samples and samples[-1][1].arrays["values"].shape != shape:
             samples.clear()
-        while samples and samples[-1].data["time_s"] >= item.data["time_s"]:
+        while samples and samples[-1][1].data["time_s"] >= item.data["time_s"]:
             samples.pop()
-        samples.append(item)
+        samples.append((self._version, item))
 
     def _tell_listeners(self) -> None:
         for listener in self._listeners:
@@ -276,9 +277,11 @@ class FleetState:
                 for key, (version, item) in self._items.items()
                 if wanted.includes(item)
             }
-            samples = tuple(self._samples) if "samples" not in versions else ()
+            seen = versions.get("samples", 0)
+            newest_first = itertools.takewhile(lambda one: one[0] > seen, reversed(self._samples))
+            samples = [sample for _, sample in newest_first][::-1]
         changed = [
-            with_history(item, samples[:-1]) if samples and key == "samples" else item
+            with_history(item, samples[:-1]) if key == "samples" and len(samples) > 1 else item
             for key, (version, item) in here.items()
             if versions.get(key) != version
         ]
@@ -301,7 +304,7 @@ class FleetState:
 
 
 def with_history(item: Item, before: Sequence[Item]) -> Item:
-    """Return the item ``samples`` as a new client gets it, with the samples before it."""
+    """Return the item ``samples`` with those before it that a client lacks."""
     history: Dict[str, NDArray[Any]] = {
         "times": np.array([sample.data["time_s"] for sample in before], np.float64),
         "history": np.array([sample.arrays["values"] for sample in before], np.float32).reshape(
