@@ -10,7 +10,7 @@ import contextlib
 import threading
 import time
 from dataclasses import replace
-from typing import Dict, Iterator, List, Optional, Sequence
+from typing import Dict, Iterator, List, Optional, Sequence, Tuple
 
 import rospy
 from nav_msgs.msg import Odometry
@@ -139,13 +139,7 @@ class MissionRunner:
     def viewers(self) -> List[Need]:
         """Return a condition for each viewer: it hears what this node publishes."""
         topics = (self._goals.resolved_name, self._flight.resolved_name)
-        return [
-            Need(
-                lambda node=node: readiness.hears(node, topics),
-                lambda node=node: f"{node}: is not ready to show the flight",
-            )
-            for node in self._setup.viewers
-        ]
+        return [_viewer_need(node, topics) for node in self._setup.viewers]
 
     def start(self) -> None:
         """Start the simulation or the vehicles, and begin or resume the mission.
@@ -361,6 +355,12 @@ def _topics_may_close() -> Iterator[None]:
         # is_shutdown() turns true only after the topics have been closed.
         if not rospy.core.is_shutdown_requested():
             raise
+
+
+def _viewer_need(node: str, topics: Tuple[str, ...]) -> Need:
+    return Need(
+        lambda: readiness.hears(node, topics), lambda: f"{node}: is not ready to show the flight"
+    )
 
 
 def _robot_needs(robot: MissionRobot, feed: StateFeed) -> List[Need]:
