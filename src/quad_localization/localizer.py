@@ -100,6 +100,14 @@ class Amcl:
         self._has_begun = False  # since the last initialisation
         self._odometry = Pose2D(0.0, 0.0)  # at the last update
 
+    @property
+    def is_lost(self) -> bool:
+        """The robot does not know its place, so that it has to hover until scans tell it."""
+        limit_m = self.params.lost_above_m
+        if self.estimate is None or limit_m == 0.0 or self.params.upstream:
+            return False
+        return bool(np.trace(self.estimate.covariance[:2, :2]) > limit_m**2)
+
     def set_map(self, grid: OccupancyMap, initial: PoseEstimate) -> None:
         """Take a map, and begin at a pose, or at the one that was given before.
 
@@ -201,7 +209,8 @@ class Amcl:
     def _is_update_due(self, odometry: Pose2D) -> bool:
         """Tell whether the robot has moved enough, or an update was requested."""
         before, params = self._odometry, self.params
-        is_requested, self.is_update_requested = self.is_update_requested, False
+        # A robot that is lost hovers: without motion its scans have to count all the same.
+        is_requested, self.is_update_requested = self.is_update_requested or self.is_lost, False
         return (
             is_requested
             or abs(odometry.x_m - before.x_m) > params.update_min_d_m

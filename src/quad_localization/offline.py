@@ -22,8 +22,6 @@ from quad_nav.sim.localization import believed_states
 from quad_nav.sim.scene import Scene
 
 MAP_RESOLUTION_M = 0.05
-LOST_M = 0.5
-"""Standard deviation of the position above which a robot counts as lost: half a doorway."""
 
 
 class SlamLocalization:
@@ -81,9 +79,9 @@ class AmclLocalization:
         places = [self._place(peer) for peer in self._odom_from_base if peer != robot]
         base_from_lidar = odom_from_base.inverse().compose(odom_from_lidar)
         peers = np.array([(one.x_m, one.y_m) for one in places]).reshape(-1, 2)
-        amcl = self._amcls[robot]
-        amcl.is_update_requested = amcl.is_update_requested or self.is_lost(robot)
-        amcl.update(Observation("lidar", scan, base_from_lidar, odom_from_base, peers))
+        self._amcls[robot].update(
+            Observation("lidar", scan, base_from_lidar, odom_from_base, peers)
+        )
 
     def _place(self, robot: int) -> Pose2D:
         return self.map_from_odom(robot).compose(self._odom_from_base[robot].to_2d())
@@ -95,8 +93,7 @@ class AmclLocalization:
 
     def is_lost(self, robot: int) -> bool:
         """Return whether a robot does not know its place, so that it has to hover."""
-        estimate = self._amcls[robot].estimate
-        return estimate is None or math.sqrt(np.trace(estimate.covariance[:2, :2])) > LOST_M
+        return self._amcls[robot].estimate is None or self._amcls[robot].is_lost
 
 
 MAKERS = {"amcl": AmclLocalization, "slam": SlamLocalization}

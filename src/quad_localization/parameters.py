@@ -125,6 +125,9 @@ class AmclParams:
     peer_radius_m: float = fixed_number(
         "peer_radius", 0.5, "m", "Beams that end so near a peer are left out; 0: none.", own=True
     )
+    lost_above_m: float = fixed_number(
+        "lost_above", 0.5, "m", "Deviation above which no transform is sent; 0: none.", own=True
+    )
     upstream: bool = fixed_flag("upstream", False, "Behave as C++ amcl, bugs included.", own=True)
 
 

@@ -26,6 +26,7 @@ from quad_localization.occupancy_map import OccupancyMap
 from quad_localization.parameters import AmclParams, read_params
 from quad_localization.ros.peers import PeerPlaces
 from quad_localization.scan_beams import tilted_yaw
+from quad_localization.start import initial_pose
 from quad_localization.warm_up import warm_up_amcl
 from quad_nav.errors import InputError, excerpt
 from quad_nav.files.kernel_cache import COMPILING, announced
@@ -43,7 +44,6 @@ from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.ros.navigator.reconfigure import ParameterServer, config_type
 from quad_nav.ros.navigator.robot_identity import number_in
-from quad_nav.sim.scene_file import load_scene
 from quad_nav.topics.health import Health, Level
 from quad_nav.topics.validation import grid_problem, pose_problem, scan_problem, stamp_problem
 
@@ -142,25 +142,17 @@ class AmclNode:
             cells, info.resolution, *place, self._amcl.params.upstream
         )
         one = self._read(rospy.get_param("~", {}))
-        pose = self._start(one)
+        robot = one.robot if one.robot >= 0 else number_in(one.base_frame_id) or 0
+        try:
+            pose = initial_pose(one, robot)
+        except InputError as error:
+            self._warn(f"map dropped: {error}")
+            return False
         variances = (one.initial_cov_xx, one.initial_cov_yy, one.initial_cov_aa)
         with self._lock:
             self._amcl.set_map(grid, PoseEstimate(pose, np.diag(variances)))
         rospy.loginfo("%s: map of %d x %d cells", self._name, info.width, info.height)
         return True
-
-    def _start(self, params: AmclParams) -> Pose2D:
-        """Return the initial pose: that of the parameters, or of the scene that they name."""
-        given = Pose2D(params.initial_pose_x_m, params.initial_pose_y_m, params.initial_pose_a_rad)
-        if not params.scene:
-            return given
-        try:
-            starts = load_scene(params.scene).starts
-        except InputError as error:
-            self._warn(f"scene: {error}; the initial pose is that of the parameters")
-            return given
-        robot = params.robot if params.robot >= 0 else number_in(params.base_frame_id) or 0
-        return starts[robot] if robot < len(starts) else given
 
     def _on_set_map(self, request: SetMapRequest) -> SetMapResponse:
         with self._lock:
@@ -307,6 +299,7 @@ class AmclNode:
     def _localise(self, stamp: rospy.Time, seen: Observation) -> None:
         with self._lock:
             update, params = self._amcl.update(seen), self._amcl.params
+            is_lost = self._amcl.is_lost
             if update is None:
                 return
             particles = self._amcl.particles
@@ -320,7 +313,7 @@ class AmclNode:
             self._pose.publish(_pose_message(update.estimate, params.global_frame_id, stamp))
         if update.map_from_odom is None:
             return
-        if params.tf_broadcast:
+        if params.tf_broadcast and not is_lost:  # without it the navigator stops
             frames = params.global_frame_id, params.odom_frame_id
             until = stamp + rospy.Duration(params.transform_tolerance_s)
             self._tf.publish(TFMessage([transform_message(update.map_from_odom, *frames, until)]))
