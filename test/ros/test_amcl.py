@@ -54,6 +54,14 @@ def map_message():
     return message
 
 
+def given(pose, frame="map", variance=0.01):
+    message = PoseWithCovarianceStamped()
+    message.header.frame_id = frame
+    message.pose.pose = pose_message(pose.to_3d())
+    message.pose.covariance = (variance * np.eye(6)).ravel().tolist()
+    return message
+
+
 class World:
     """A robot in the room: tf, odometry of a peer beside it, and scans in which that peer is."""
 
@@ -138,13 +146,18 @@ class AmclCase(unittest.TestCase):
     def wait_localised(self, what):
         wait(lambda: self.error_m() < NEAR_M, lambda: f"{what}: {self.error_m():.2f} m off")
 
-    def give(self, pose, frame="map", variance=0.01):
-        message = PoseWithCovarianceStamped()
-        message.header.frame_id = frame
-        message.pose.pose = pose_message(pose.to_3d())
-        message.pose.covariance = (variance * np.eye(6)).ravel().tolist()
+    def check_stays_localised(self):
+        """The next ten poses are right, by their median: a single one may be a random pose's."""
+        errors_m = []
+        while len(errors_m) < 10:
+            count = len(self.poses)
+            wait(lambda count=count: len(self.poses) > count, "a pose")
+            errors_m.append(self.error_m())
+        self.assertLess(np.median(errors_m), NEAR_M)
+
+    def give(self, pose):
         wait(lambda: self.initial.get_num_connections() > 0, "a subscriber of initialpose0")
-        self.initial.publish(message)
+        self.initial.publish(given(pose))
 
     def spread_m(self):
         places = np.array([(one.position.x, one.position.y) for one in self.clouds[-1].poses])
@@ -179,12 +192,14 @@ class AmclCase(unittest.TestCase):
         wait(lambda: sum(map(is_sent, expected_s())) > 3, "transforms stamped as expected")
 
     def test_3_takes_poses_in_its_own_frame_alone(self):
-        self.give(Pose2D(5.0, 1.0), frame="odom0")
-        self.give(Pose2D(math.nan, 1.0))
-        self.give(Pose2D(5.0, 1.0), variance=-1.0)
-        count = len(self.poses)
-        wait(lambda: len(self.poses) > count + 1, "poses")
-        self.assertLess(self.error_m(), NEAR_M)
+        for pose, more in (
+            (Pose2D(5.0, 1.0), {"frame": "odom0"}),
+            (Pose2D(math.nan, 1.0), {}),
+            (Pose2D(5.0, 1.0), {"variance": -1.0}),
+        ):
+            response = rospy.ServiceProxy("/set_map", SetMap)(map_message(), given(pose, **more))
+            self.assertFalse(response.success)
+        self.check_stays_localised()
         self.give(Pose2D(4.5, 1.5))
         wait(lambda: self.error_m() > 1.0, "the pose that was given")
         self.give(self.world.pose)
@@ -193,8 +208,8 @@ class AmclCase(unittest.TestCase):
     def test_4_services(self):
         rospy.ServiceProxy("/global_localization", Empty)()
         wait(lambda: self.spread_m() > 0.8, lambda: f"spread {self.spread_m():.2f} m")
-        response = self.set_map()
-        self.assertTrue(response.success)
+        set_map = rospy.ServiceProxy("/set_map", SetMap)
+        self.assertTrue(set_map(map_message(), given(self.world.pose)).success)
         self.wait_localised("from set_map")
         self.world.moves = False
         self.settle()
@@ -202,13 +217,6 @@ class AmclCase(unittest.TestCase):
         rospy.ServiceProxy("/request_nomotion_update", Empty)()
         wait(lambda: len(self.clouds) > count, "a cloud without motion")
         self.world.moves = True
-
-    def set_map(self):
-        initial = PoseWithCovarianceStamped()
-        initial.header.frame_id = "map"
-        initial.pose.pose = pose_message(self.world.pose.to_3d())
-        initial.pose.covariance = (0.01 * np.eye(6)).ravel().tolist()
-        return rospy.ServiceProxy("/set_map", SetMap)(map_message(), initial)
 
     def settle(self):
         """Wait until a robot that stands has no update any more: as many scans without a cloud."""
@@ -229,9 +237,7 @@ class AmclCase(unittest.TestCase):
         self.assertEqual(answer["max_particles"], 10000)
         self.assertEqual(answer["recovery_alpha_fast"], 0.1)
         answer = client.update_configuration({"max_particles": 800})
-        count = len(self.poses)
-        wait(lambda: len(self.poses) > count + 2, "poses")
-        self.assertLess(self.error_m(), NEAR_M)
+        self.check_stays_localised()
         self.assertEqual(rospy.get_param("/amcl0/max_particles"), 800)
 
     def test_6_saves_the_pose(self):
@@ -240,13 +246,12 @@ class AmclCase(unittest.TestCase):
             return Pose2D(*saved).distance_to(Pose2D(2.0, 2.0))
 
         wait(lambda: abs(saved_m() - 0.5) < NEAR_M, lambda: f"saved {saved_m():.2f} m away")
-        self.assertLess(rospy.get_param("/amcl0/initial_cov_xx"), 0.25)
+        saved = rospy.get_param("/amcl0/initial_cov_xx")
+        self.assertIn(saved, [one.pose.covariance[0] for one in self.poses])
 
     def test_7_stays_localised_face_to_face(self):
         self.world.has_peer = True
-        count = len(self.poses)
-        wait(lambda: len(self.poses) > count + 10, "poses with a peer in the scans")
-        self.assertLess(self.error_m(), NEAR_M)
+        self.check_stays_localised()
         last = pose_from_message(self.poses[-1].pose.pose).to_2d()
         self.assertLess(last.distance_to(Pose2D(2.0, 2.0)), 1.0)
 
