@@ -23,6 +23,9 @@ from quad_nav.geometry import Pose2D, Pose3D, Scan
 
 Floats = NDArray[np.float64]
 
+_SURE = 0.5
+"""Weight of a cluster below which another place is as likely."""
+
 
 @dataclass(frozen=True)
 class PoseEstimate:
@@ -102,11 +105,17 @@ class Amcl:
 
     @property
     def is_lost(self) -> bool:
-        """The robot does not know its place, so that it has to hover until scans tell it."""
+        """The robot does not know its place, so that it has to hover until scans tell it.
+
+        The heaviest cluster decides: random particles of the recovery spread all of them.
+        """
         limit_m = self.params.lost_above_m
-        if self.estimate is None or limit_m == 0.0 or self.params.upstream:
+        if self.particles is None or limit_m == 0.0 or self.params.upstream:
             return False
-        return bool(np.trace(self.estimate.covariance[:2, :2]) > limit_m**2)
+        statistics = self.particles.statistics
+        if statistics.best < 0 or statistics.weights[statistics.best] < _SURE:
+            return True
+        return bool(np.trace(statistics.covariances[statistics.best][:2, :2]) > limit_m**2)
 
     def set_map(self, grid: OccupancyMap, initial: PoseEstimate) -> None:
         """Take a map, and begin at a pose, or at the one that was given before.
