@@ -15,7 +15,7 @@ from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.map_edge import closed_edge, edge_strips
 from quad_nav.costmap.static import StaticLayerParams, StaticMap
-from quad_nav.errors import PlanningError
+from quad_nav.errors import GoalOutsideMap, PlanningError
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import INSCRIBED
 from quad_nav.mission.goal_file import GoalSequence
@@ -109,14 +109,9 @@ class GoalPlans:
             if fault:
                 continue
             goal_name = f"goal {index + 1}"
-            if _is_off_window(configuration.global_costmap, here, goal.pose):
-                warnings.append(
-                    f"quad{number}: {goal_name} ({goal.x_m:g}, {goal.y_m:g}): off the rolling "
-                    f"global_costmap around {name}, to which no plan leads; expected a larger one, "
-                    "or goals between"
-                )
-                continue
             try:
+                if _is_off_window(configuration.global_costmap, here, goal.pose):
+                    raise GoalOutsideMap("it rolls with the robot and ends before the goal")
                 with closed_edge(costmap, here, goal.pose, configuration.navigator.plan_inside_map):
                     plan = planner.make_plan(costmap.spec, costmap.costs.copy(), here, goal.pose)
             except PlanningError as error:

@@ -154,8 +154,7 @@ def _read_scene(
         read_walkers(check, fields),
         is_map="map" in fields,
     )
-    check_motions(check, scene)
-    _check_names(check, scene)
+    _check_solids(check, scene)
     if arena_is_sound and imported and "starts" not in fields:
         return _with_chosen_starts(check, scene, imported, goals)
     if arena_is_sound:
@@ -294,8 +293,9 @@ def _read_start(check: Checker, entry: Any, place: str) -> Optional[Pose2D]:
     return start if len(check.problems) == faults_before else None
 
 
-def _check_names(check: Checker, scene: Scene) -> None:
-    """Check that names are unique, because they identify obstacles in contacts."""
+def _check_solids(check: Checker, scene: Scene) -> None:
+    """Check the motions, and that names are unique, because they identify obstacles in contacts."""
+    check_motions(check, scene)
     taken = {wall.name for wall in scene.wall_boxes()} | {"floor"}
     for obstacle in (*scene.obstacles, *scene.moving_shapes):
         if obstacle.name in taken:
