@@ -125,7 +125,8 @@ def split_source(name: str) -> Tuple[Path, str]:
     for end, letter in enumerate(name):
         head = Path(name[:end]).expanduser()
         if letter == ":" and name[:end] and head.exists():
-            return head, name[end + 1 :].lstrip(":")
+            # FOLDER:NAME:arg=VALUE is FOLDER:NAME,arg=VALUE
+            return head, re.sub(r":(?=\w+=)", ",", name[end + 1 :].lstrip(":"))
     return config_folder(name), ""
 
 

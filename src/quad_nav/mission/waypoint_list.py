@@ -32,9 +32,6 @@ from quad_nav.mission.waypoint_fields import (
 from quad_nav.mission.waypoint_table import TUW, read_table, read_tuw
 from quad_nav.mission.waypoint_tree import NamedRecords, find_lists, frames, read_documents
 
-EXPECTED = (
-    "expected a goal file, or a list of waypoints in YAML, JSON, CSV or a file of QGroundControl"
-)
 _MAP_FRAMES = {"", "map", "world"}
 
 

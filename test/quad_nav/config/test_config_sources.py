@@ -95,10 +95,19 @@ def test_a_flight_needs_a_choice_and_the_refusal_has_it_to_copy(tmp_path):
     assert config_label(f"{tmp_path}:small,static") == f"{tmp_path.name}:small,static"
 
 
+RATES = {"fast": 20.0, "slow": 5.0}
+
+
 def test_values_of_arguments_in_the_files_of_a_folder(tmp_path):
     write(tmp_path, {"costmap_common_a.yaml": "robot_base_frame: $(arg prefix)base"})
     assert tree(f"{tmp_path}:prefix=my_")["local_costmap"] == {"robot_base_frame": "my_base"}
     assert "unknown $(arg prefix)" in refusal_of_tree(tmp_path)[0]
+    rates = {f"move_{name}.yaml": f"controller_frequency: {rate}" for name, rate in RATES.items()}
+    write(tmp_path, rates)
+    for given in ("slow:prefix=my_", "slow,prefix=my_", "prefix=my_,slow"):
+        chosen = tree(f"{tmp_path}:{given}")
+        assert chosen["local_costmap"] == {"robot_base_frame": "my_base"}
+        assert chosen["controller_frequency"] == RATES["slow"]
 
 
 def test_unknown_choice_lists_what_there_is(tmp_path):
