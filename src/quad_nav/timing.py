@@ -57,17 +57,26 @@ class Schedule:
         return True
 
 
-class StallTimer:
-    """Measures how long a robot has stayed near one place."""
+class _Timer:
+    """Measures a time."""
 
     def __init__(self) -> None:
-        """Create a timer without a reference pose; it does not run yet."""
-        self._reference: Optional[Pose2D] = None
+        """Create a timer that does not run yet."""
         self._since_s = math.inf
 
     def restart(self, now_s: float) -> None:
-        """Set the elapsed time to zero and keep the reference pose."""
+        """Set the elapsed time to zero; what the robot has reached so far stays."""
         self._since_s = now_s
+
+    def exceeds(self, now_s: float, timeout_s: float) -> bool:
+        """Return whether the robot has stalled for longer than the timeout; 0 is no timeout."""
+        return timeout_s > 0.0 and now_s > self._since_s + timeout_s
+
+
+class StallTimer(_Timer):
+    """Measures how long a robot has stayed near one place."""
+
+    _reference: Optional[Pose2D] = None
 
     def has_moved(self, now_s: float, pose: Pose2D, distance_m: float) -> bool:
         """Return whether the robot has left the circle around the reference pose.
@@ -78,9 +87,28 @@ class StallTimer:
         if self._reference is not None and pose.distance_to(self._reference) < distance_m:
             return False
         self._reference = pose
-        self._since_s = now_s
+        self.restart(now_s)
         return True
 
-    def exceeds(self, now_s: float, timeout_s: float) -> bool:
-        """Return whether the robot has stalled for longer than the timeout; 0 is no timeout."""
-        return timeout_s > 0.0 and now_s > self._since_s + timeout_s
+
+class ApproachTimer(_Timer):
+    """Measures how long a robot has come no nearer to the end of its plan than before.
+
+    Attributes:
+        detour_m: By how much the way left has been longer since then.
+    """
+
+    detour_m = 0.0
+    _shortest_m = math.inf
+
+    def has_approached(self, now_s: float, left_m: float, distance_m: float) -> bool:
+        """Return whether less of the way is left than ever before, by a distance at least.
+
+        If so, or at the first call, the timer restarts.
+        """
+        if left_m > self._shortest_m - distance_m:
+            self.detour_m = max(self.detour_m, left_m - self._shortest_m)
+            return False
+        self._shortest_m, self.detour_m = left_m, 0.0
+        self.restart(now_s)
+        return True

@@ -76,11 +76,12 @@ def find_conflict(
     """Find the peer of highest priority that the robot has to yield to.
 
     A robot goes on if that takes it out of the peer's way in time. It does not wait for a
-    stationary peer, but makes room on its path, because it may be the reason why the peer stands.
+    stationary peer, but makes room on its path, because it may be the reason why the peer stands:
+    far away only a parked robot on the end of that path, which no plan leads around.
 
     Args:
         position: Position of the robot, float64[2], metres in ``map``.
-        path: Path of the robot, float64[n, 2], metres in ``map``.
+        path: Path of the robot, float64[n, 2], metres in ``map``; empty for a parked robot.
         priority: Priority of the robot.
         peers: Peers whose state is fresh.
         min_separation_m: Minimum separation of two robots' centres.
@@ -97,6 +98,9 @@ def find_conflict(
     for peer in sorted(before, key=lambda peer: -peer.intention.priority):
         stands = peer.name in stationary
         if stands and np.hypot(*(peer.position - position)) > _BLOCKING_FACTOR * min_separation_m:
+            end = peer.intention.path[-1]
+            if not len(path) and np.hypot(*(end - position)) < min_separation_m:
+                return peer, Yield.MAKE_ROOM
             continue
         theirs = predict_peer(peer, cruise_mps)
         if stands or _conflict(own, theirs, min_separation_m):

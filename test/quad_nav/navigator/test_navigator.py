@@ -13,6 +13,7 @@ from quad_nav.errors import GoalOutsideMap, NoPath, NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
 from quad_nav.navigator.command_filter import VoronoiCell
+from quad_nav.navigator.control_supervisor import way_left_m
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
 from quad_nav.navigator.tick import RobotPoses, State, Trigger
@@ -55,13 +56,15 @@ class FakeCostmap:
 class FakePlanner:
     def __init__(self):
         self.fails, self.error = False, NoPath("walled in")
-        self.calls = 0
+        self.calls, self.corner = 0, None
 
     def make_plan(self, spec, costs, start, goal):
         self.calls += 1
         if self.fails:
             raise self.error
-        return np.array([[start.x_m, start.y_m, 0.0], [goal.x_m, goal.y_m, goal.yaw_rad]])
+        by_way_of = [] if self.corner is None else [self.corner]
+        ends = [start.x_m, start.y_m, 0.0], [goal.x_m, goal.y_m, goal.yaw_rad]
+        return np.array([ends[0], *by_way_of, ends[1]])
 
 
 @dataclass(frozen=True)
@@ -230,6 +233,59 @@ def test_a_robot_without_progress_relaxes_the_obstacle_weight_until_it_has_moved
     flight.pose = Pose2D(1.6, 1.0)  # oscillation_distance is 0.5
     flight.until(7.0)
     assert weights.params.occdist_scale == 0.01
+
+
+def test_a_second_stall_leaves_no_weight_to_obstacle_costs_before_any_recovery():
+    """DWA does not check collisions at a weight of 0."""
+    flight = Flight([NamedRecovery("r", FakeRecovery())], {"progress_timeout": 2.0})
+    flight.controller.params = Weights(occdist_scale=0.1)
+    flight.navigator.set_goal(GOAL, 0.0)
+    assert not any(tick.recovery for tick in flight.until(5.5))
+    assert 0.0 < flight.controller.params.occdist_scale < 1e-6
+    assert any(tick.recovery for tick in flight.until(7.5))
+
+
+def moved_along(flight, places):
+    """Fly by way of places float64[n, 2], one in half a second; return the ticks."""
+    ticks = []
+    for x_m, y_m in places.tolist():
+        flight.pose = Pose2D(x_m, y_m)
+        ticks += flight.until(flight.now_s + 0.5)
+    return ticks
+
+
+@pytest.mark.parametrize("planner_hz", [0.0, 2.0])
+def test_a_robot_that_circles_makes_no_progress(planner_hz):
+    """It is 3.5 to 4.5 m from the goal, and has 2 s and the time to fly that metre slowly."""
+    recovery = NamedRecovery("r", FakeRecovery())
+    flight = Flight([recovery], {"progress_timeout": 2.0}, planner_frequency_hz=planner_hz)
+    flight.navigator.set_goal(GOAL, 0.0)
+    turns_rad = np.linspace(0.0, 8.0 * np.pi, 65)
+    circles = np.column_stack((1.0 + 0.5 * np.cos(turns_rad), 1.0 + 0.5 * np.sin(turns_rad)))
+    ticks = moved_along(flight, circles)
+    warnings = [line for tick in ticks for line in tick.warnings]
+    assert warnings[0].startswith("no progress for") and warnings[0].endswith("replanning")
+    assert [tick.recovery.trigger for tick in ticks if tick.recovery][:1] == [Trigger.OSCILLATION]
+
+
+def test_a_robot_has_the_time_to_fly_a_detour():
+    """When 2.2 m are left, 6.7 m by way of a corner are found; it flies at 0.2 m/s."""
+    flight = Flight(tree={"progress_timeout": 2.0}, planner_frequency_hz=2.0)
+    flight.navigator.set_goal(GOAL, 0.0)
+    ticks = moved_along(flight, np.linspace((1.0, 1.0), (2.8, 1.0), 18))
+    flight.planner.corner = [2.8, 4.0, 0.0]
+    ticks += moved_along(flight, np.linspace((2.8, 1.1), (2.8, 4.0), 30))
+    flight.planner.corner = None
+    ticks += moved_along(flight, np.linspace((2.9, 3.9), (4.9, 1.1), 36))
+    assert [tick.warnings for tick in ticks if tick.warnings] == []
+
+
+def test_the_way_left_leads_to_the_plan_and_along_it():
+    plan = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 4.0, 0.0]])
+    assert way_left_m(plan, Pose2D(1.0, 0.5)) == pytest.approx(0.5 + 2.0 + 4.0)
+    assert way_left_m(plan, Pose2D(-1.0, 0.0)) == pytest.approx(1.0 + 3.0 + 4.0)
+    assert way_left_m(plan, Pose2D(3.0, 5.0)) == pytest.approx(1.0)
+    assert way_left_m(plan[:1], Pose2D(0.0, 2.0)) == pytest.approx(2.0)
 
 
 def test_cancel_publishes_one_stop():
