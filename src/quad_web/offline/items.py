@@ -128,7 +128,8 @@ class FlightItems:
         """Return what changes all the time, of all robots."""
         flight, setup = self._flight, self._flight.setup
         poses = poses_item(flight.now_s, time.time(), flight.states.bodies.rows)
-        moving = flight.simulation.movers.poses(flight.now_s)
+        movers = flight.simulation.movers
+        moving = movers.poses(flight.now_s)
         cycles_s = np.full(len(self._names), np.nan)
         for view in views:
             if view.cycle_wall_s is not None:
@@ -155,11 +156,7 @@ class FlightItems:
             ),
             poses,
             *self._obstacles.items(setup.scene, moving),
-            *self._samples.take(
-                setup.robot_radius_m,
-                flight.simulation.movers.flight_surface_distances_m,
-                cycles_s,
-            ),
+            *self._samples.take(setup.robot_radius_m, movers.flight_surface_distances_m, cycles_s),
             yields,
             *([status] if views else []),
         ]

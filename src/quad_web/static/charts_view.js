@@ -68,6 +68,7 @@ export class View {
       const { clientWidth: width, clientHeight: height } = this._root;
       this._chart.resize({ width, height });
       this._chart.setOption(layoutOptions(width, height));
+      this._empty = "";
       this._hasNews = true;
       this._draw();
     }
@@ -90,7 +91,12 @@ export class View {
     const colours = this._link.store.get("robots")?.data.colours ?? [];
     const colourOf = (robot) => seen(colours[robot] ?? INK.limited);
     const series = seriesOptions(this._history, this._selected, colourOf);
+    this._chart.setOption({ series }, { replaceMerge: ["series"] });
     const graphic = emptyOptions(this._history, this._link.store.get("flight")?.data.source);
-    this._chart.setOption({ series, graphic }, { replaceMerge: ["series"] });
+    const empty = JSON.stringify(graphic);
+    if (empty !== this._empty) {
+      this._empty = empty;
+      this._chart.setOption({ graphic });
+    }
   }
 }
