@@ -166,6 +166,35 @@ def parse_goals(
     Raises:
         InputError: The content has faults; lists all of them.
     """
+    sequence, problems = _read_sequence(content, name, check_place, defaults)
+    if problems:
+        raise InputError(problems)
+    return sequence
+
+
+def readable_goals(path: Union[str, Path]) -> Optional[GoalSequence]:
+    """Read the goals of a file up to the first faulty one, to show them; None without any.
+
+    ``load_goals`` has the faults, those in other keys included.
+    """
+    try:
+        sequence, _ = _read_sequence(read_bytes(Path(path), MAX_BYTES), str(path))
+    except InputError:
+        return None
+    return sequence if sequence.goals else None
+
+
+def _read_sequence(
+    content: Union[bytes, str],
+    name: str,
+    check_place: Optional[PlaceCheck] = None,
+    defaults: SequenceSettings = DEFAULT_SETTINGS,
+) -> Tuple[GoalSequence, List[str]]:
+    """Return what can be read, and the faults.
+
+    Raises:
+        InputError: The content is no JSON object.
+    """
     tree, problems = _decode(content, name)
     if not isinstance(tree, dict):
         raise InputError([f'{name}: is {_kind(tree)}; expected {{"goals": [[x, y], ...]}}'])
@@ -176,11 +205,10 @@ def parse_goals(
     settings, faults = read_settings(given, name, defaults)
     goals, faults_in_goals = _read_goals(tree, name, check_place)
     problems += faults + faults_in_goals
+    sequence = GoalSequence(tuple(goals), settings)
     if not problems and settings.loop:
-        problems += _loop_faults(GoalSequence(tuple(goals), settings), name)
-    if problems:
-        raise InputError(problems)
-    return GoalSequence(tuple(goals), settings)
+        problems += _loop_faults(sequence, name)
+    return sequence, problems
 
 
 def read_settings(
@@ -287,7 +315,8 @@ def _read_goals(
         faults = list(goal_faults(entry))
         if not faults:
             goal = read_goal(entry)
-            goals.append(goal)
+            if len(goals) == index:  # behind a faulty one its number would be wrong
+                goals.append(goal)
             fault = check_place(goal.x_m, goal.y_m) if check_place else None
             faults = [f": ({goal.x_m:g}, {goal.y_m:g}) {fault}"] if fault else []
         problems += [place + fault for fault in faults]

@@ -10,6 +10,7 @@ import contextlib
 import threading
 import time
 from dataclasses import replace
+from functools import partial
 from typing import Dict, Iterator, List, Optional, Sequence
 
 import rospy
@@ -141,8 +142,8 @@ class MissionRunner:
         topics = (self._goals.resolved_name, self._flight.resolved_name)
         return [
             Need(
-                lambda node=node: readiness.hears(node, topics),
-                lambda node=node: f"{node}: is not ready to show the flight",
+                partial(readiness.hears, node, topics),
+                partial("{}: is not ready to show the flight".format, node),
             )
             for node in self._setup.viewers
         ]
