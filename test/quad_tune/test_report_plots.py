@@ -15,11 +15,11 @@ from matplotlib.text import Text
 from optuna.trial import TrialState, create_trial
 from study_flights import FLOWN, PaperWorkers, tune_setup
 
+from quad_nav.report.panels import paper_figure
 from quad_nav.report.style import png, styled
 from quad_tune.evaluation import StudyObserver
 from quad_tune.flight_result import FlightResult
 from quad_tune.proposals import distributions
-from quad_tune.report.panels import paper_figure
 from quad_tune.report.sweep_measures import (
     MEASURES,
     Estimate,

@@ -176,10 +176,46 @@ def parse_goals(
         InputError: Every fault of the content.
     """
     text = decoded(content, name)
-    # A mistake in a file with our name is a mistake, not another format.
-    waypoints = None if _OWN_NAME.search(name) else read_waypoints(text, name)
+    waypoints = _waypoints(text, name)
     if waypoints is not None:
         return goals_of(waypoints, name, check_place, defaults, robot)
+    sequence, problems = _read_sequence(text, name, check_place, defaults)
+    if problems:
+        raise InputError(problems)
+    return sequence
+
+
+def readable_goals(path: Union[str, Path], robot: int = 0) -> Optional[GoalSequence]:
+    """Read the goals of a file up to the first faulty one, to show them; None without any.
+
+    ``load_goals`` has the faults, those in other keys included.
+    """
+    try:
+        text = decoded(read_bytes(Path(path), MAX_BYTES), str(path))
+        if _waypoints(text, str(path)) is not None:
+            return load_goals(path, robot=robot)
+        sequence, _ = _read_sequence(text, str(path))
+    except InputError:
+        return None
+    return sequence if sequence.goals else None
+
+
+def _waypoints(text: str, name: str) -> Optional[WaypointList]:
+    """Read a list of another program; a mistake in a file with our name is no other format."""
+    return None if _OWN_NAME.search(name) else read_waypoints(text, name)
+
+
+def _read_sequence(
+    text: str,
+    name: str,
+    check_place: Optional[PlaceCheck] = None,
+    defaults: SequenceSettings = DEFAULT_SETTINGS,
+) -> Tuple[GoalSequence, List[str]]:
+    """Return what can be read, and the faults.
+
+    Raises:
+        InputError: The content is no JSON object.
+    """
     tree, problems = _tree(text, name)
     if not isinstance(tree, dict):
         raise InputError([f'{name}: is {_kind(tree)}; expected {{"goals": [[x, y], ...]}}'])
@@ -190,11 +226,10 @@ def parse_goals(
     settings, faults = read_settings(given, name, defaults)
     goals, faults_in_goals = _read_goals(tree, name, check_place)
     problems += faults + faults_in_goals
+    sequence = GoalSequence(tuple(goals), settings)
     if not problems and settings.loop:
-        problems += _loop_faults(GoalSequence(tuple(goals), settings), name)
-    if problems:
-        raise InputError(problems)
-    return GoalSequence(tuple(goals), settings)
+        problems += _loop_faults(sequence, name)
+    return sequence, problems
 
 
 def read_settings(
@@ -342,7 +377,8 @@ def _read_goals(
     problems: List[str] = []
     for index, entry in enumerate(entries):
         place = f"{name}: goals[{index}] (goal {index + 1})"
-        problems += _add_goal(goals, entry, place, check_place)
+        # Behind a faulty one the number of a goal would be wrong.
+        problems += _add_goal(goals if len(goals) == index else [], entry, place, check_place)
     return goals, problems
 
 

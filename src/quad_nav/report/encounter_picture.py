@@ -57,16 +57,17 @@ def _draw_frame(
     axes: Axes, trace: FlightTrace, tracks: Tracks, encounter: Encounter, time_s: float
 ) -> None:
     now = tracks.index_at(time_s)
-    x_m, y_m, half_m = encounter.x_m, encounter.y_m, _HALF_SIZE_M
+    x_m, y_m = encounter.x_m, encounter.y_m
+    half_m = max(_HALF_SIZE_M, 0.5 * encounter.separation_m + 3.0 * trace.robot_radius_m)
     shown = (x_m - half_m, x_m + half_m, y_m - half_m, y_m + half_m)
     draw_scene(axes, trace.scene, shown)
     draw_moving(axes, trace, time_s)
     offsets_m = np.abs(tracks.positions_m[:, now] - (encounter.x_m, encounter.y_m)).max(axis=1)
-    for k in np.flatnonzero(offsets_m < _HALF_SIZE_M + _NEAR_M):
+    for k in np.flatnonzero(offsets_m < half_m + _NEAR_M):
         _draw_robot(axes, tracks, int(k), now, trace.robot_radius_m)
     nearest = abs(time_s - encounter.time_s) < 1e-9
     ink = ALARM if nearest else QUIET
-    if nearest and encounter.other is None:
+    if nearest and encounter.is_contact:
         axes.plot(encounter.x_m, encounter.y_m, "X", color=ALARM, mec="white", ms=10, zorder=9)
     axes.set(xlim=shown[:2], ylim=shown[2:], xticks=[], yticks=[])
     axes.set_title(f"{time_s:.1f} s", loc="center", fontsize=9, color=ALARM if nearest else "black")

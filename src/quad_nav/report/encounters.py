@@ -9,9 +9,9 @@ from typing import Dict, List, Optional, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.mission.distances import separations_m
+from quad_nav.mission.distances import nearest_separations_m, separations_m
 from quad_nav.recording.trace import FlightTrace
-from quad_nav.report.measures import Tracks, runs
+from quad_nav.report.measures import Tracks, clearances_m, runs
 
 CLOSE_M = 0.5
 """Separation below which two robots have a close encounter."""
@@ -27,7 +27,7 @@ class Encounter:
 
     Attributes:
         robot: Number of a robot.
-        other: Number of the other robot; None for an obstacle or wall, which only count on contact.
+        other: Number of the other robot; None for an obstacle or wall.
         names: Names of both.
         time_s: Time of the closest moment.
         separation_m: Distance between the hulls. 0 for a contact.
@@ -42,6 +42,41 @@ class Encounter:
     separation_m: float
     x_m: float
     y_m: float
+
+    @property
+    def is_contact(self) -> bool:
+        """Whether it is the contact with an obstacle."""
+        return self.other is None and self.separation_m == 0.0
+
+    @property
+    def is_close(self) -> bool:
+        """Whether it is more than the closest moment of a flight without encounters."""
+        return self.is_contact or (self.other is not None and self.separation_m < CLOSE_M)
+
+
+def closest_moment(trace: FlightTrace, tracks: Tracks) -> Tuple[Encounter, ...]:
+    """Return when two robots, or a lone one and an obstacle, were closest; empty if unknown."""
+    is_alone = len(trace.robots) < 2
+    gaps_m = (
+        clearances_m(tracks, trace)
+        if is_alone
+        else nearest_separations_m(tracks.positions_m, trace.robot_radius_m)
+    )
+    if not np.isfinite(gaps_m).any():
+        return ()
+    robot, now = map(int, np.unravel_index(np.nanargmin(gaps_m), gaps_m.shape))
+    gap_m, time_s = float(gaps_m[robot, now]), float(tracks.times_s[now])
+    here = tracks.positions_m[:, now]
+    name = trace.robots[robot].name
+    if is_alone:
+        names = (name, "the nearest obstacle or wall")
+        return (Encounter(robot, None, names, time_s, gap_m, *here[robot].tolist()),)
+    distances_m = np.hypot(*(here - here[robot]).T)
+    distances_m[robot] = np.nan
+    other = int(np.nanargmin(distances_m))
+    names = (name, trace.robots[other].name)
+    middle = here[[robot, other]].mean(axis=0).tolist()
+    return (Encounter(robot, other, names, time_s, gap_m, *middle),)
 
 
 def encounters(

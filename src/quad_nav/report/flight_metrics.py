@@ -10,6 +10,7 @@ import numpy as np
 from quad_nav.mission.distances import gap_m, nearest_separations_m
 from quad_nav.recording.trace import FlightTrace, RobotTrace
 from quad_nav.report.measures import (
+    Span,
     Tracks,
     clearances_m,
     goal_end_s,
@@ -21,6 +22,7 @@ from quad_nav.report.measures import (
     spins,
     straight_length_m,
     tilt_rad,
+    trace_span_s,
 )
 
 
@@ -31,6 +33,7 @@ class RobotMetrics:
     name: str
     sent: int
     reached: int
+    skipped: int
     path_length_m: float
     straight_length_m: float
     min_clearance_m: Optional[float]
@@ -46,8 +49,9 @@ class RobotMetrics:
 class FlightMetrics:
     """Metrics of a flight.
 
-    ``mission_s`` runs from sending the first goal to the end of the last one. ``cycle_ms`` is the
-    mean wall time of a control cycle; None if it is not known, as from recordings.
+    ``mission_s`` runs from sending the first goal to the end of the last one. ``covered_s`` is the
+    period of a recording that does not hold the whole mission; None if it does. ``cycle_ms`` is
+    the mean wall time of a control cycle; None if it is not known, as from recordings.
     """
 
     title: str
@@ -58,6 +62,7 @@ class FlightMetrics:
     contacts: int
     reason: str
     cycle_ms: Optional[float] = None
+    covered_s: Optional[Span] = None
 
     @property
     def sent(self) -> int:
@@ -72,17 +77,38 @@ class FlightMetrics:
     @property
     def success(self) -> bool:
         """True if goals were sent, all were reached and there was no contact."""
-        return not self.faults
+        return self.verdict == "completed"
+
+    @property
+    def verdict(self) -> str:
+        """``completed``, ``failed`` or, as far as the recording tells, ``not complete``."""
+        if self.faults:
+            return "failed"
+        return "completed" if self.covered_s is None else "not complete"
+
+    @property
+    def remarks(self) -> Tuple[str, ...]:
+        """Reasons for the verdict."""
+        if self.covered_s is None:
+            return self.faults
+        first_s, last_s = self.covered_s
+        return (
+            f"recording covers {first_s:.1f} to {last_s:.1f} s; mission not complete",
+            *self.faults,
+        )
 
     @property
     def faults(self) -> Tuple[str, ...]:
         """Reasons why the flight failed."""
         found = [f"ended early ({self.reason})"] if self.reason else []
-        if self.reached < self.sent:
-            found.append(f"{self.sent - self.reached} of {self.sent} goals not reached")
+        missed = self.sent - self.reached
+        if self.covered_s is not None:
+            missed = sum(robot.skipped for robot in self.robots)
+        if missed:
+            found.append(f"{missed} of {self.sent} goals not reached")
         if self.contacts:
             found.append(f"{self.contacts} contact{'s' * (self.contacts > 1)}")
-        return tuple(found) if self.sent else (*found, "no goal was sent")
+        return tuple(found) if self.sent or self.covered_s else (*found, "no goal was sent")
 
     @property
     def detour(self) -> Optional[float]:
@@ -138,7 +164,18 @@ def flight_metrics(trace: FlightTrace, tracks: Optional[Tracks] = None) -> Fligh
         len(trace.contacts),
         trace.reason,
         _mean_cycle_ms(trace),
+        _covered_s(trace),
     )
+
+
+def _covered_s(trace: FlightTrace) -> Optional[Span]:
+    """Return the period of a recording that lacks a part of the mission; None if it lacks none."""
+    is_whole = all(
+        len({goal.index for goal in robot.goals}) >= len(robot.mission)
+        and all(goal.ended_s is not None for goal in robot.goals)
+        for robot in trace.robots
+    )
+    return None if is_whole or trace.reason else trace_span_s(trace)
 
 
 def _mean_cycle_ms(trace: FlightTrace) -> Optional[float]:
@@ -163,6 +200,7 @@ def _robot(
         robot.name,
         len(robot.goals),
         sum(goal.reached for goal in robot.goals),
+        sum(goal.ended_s is not None and not goal.reached for goal in robot.goals),
         path_length_m(robot, span),
         straight_length_m(robot),
         gap_m(clearance_m, False in touched),

@@ -10,14 +10,22 @@ from quad_nav.recording.trace import FlightTrace
 from quad_nav.report import style
 from quad_nav.report.distances import distance_panels, speed_panel
 from quad_nav.report.encounter_picture import encounter_picture
-from quad_nav.report.encounters import CLOSE_M, LETTERS, Encounter, encounters, separation_text
+from quad_nav.report.encounters import (
+    CLOSE_M,
+    LETTERS,
+    Encounter,
+    closest_moment,
+    encounters,
+    separation_text,
+)
 from quad_nav.report.flight_metrics import FlightMetrics, flight_metrics
 from quad_nav.report.matplotlib_figures import distance_picture, paths_picture, timeline_picture
 from quad_nav.report.measures import Tracks, resampled_tracks
 from quad_nav.report.page import MAX_STRIPS, Page, Section, picture, render
+from quad_nav.report.panels import plot_section
 from quad_nav.report.paths import flown_paths
 from quad_nav.report.plotly_figures import distance_plot, paths_plot, timeline_plot
-from quad_nav.report.robot_picture import cycle_picture, has_wall_times, motion_picture
+from quad_nav.report.robot_plots import cycle_plot, has_wall_times, motion_plot
 from quad_nav.report.timeline import timeline
 
 
@@ -26,7 +34,7 @@ def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page
     tracks = resampled_tracks(trace)
     flight = flight_metrics(trace, tracks)
     found = encounters(trace, tracks)
-    shown = found[:MAX_STRIPS]
+    shown = found[:MAX_STRIPS] or closest_moment(trace, tracks)
     sections = [
         _paths(trace, tracks, shown),
         _encounters(trace, tracks, found, shown),
@@ -66,18 +74,17 @@ def _paths(trace: FlightTrace, tracks: Tracks, shown: Sequence[Encounter]) -> Se
 def _encounters(
     trace: FlightTrace, tracks: Tracks, found: Sequence[Encounter], shown: Sequence[Encounter]
 ) -> Section:
-    if not found:
-        text = (
-            f"No separation below {CLOSE_M:g} m and no contact with an obstacle."
-            if len(trace.robots) > 1
-            else "No contact with an obstacle."
+    if found:
+        caption = f"Contacts with obstacles, and separations below {CLOSE_M:g} m."
+    elif len(trace.robots) > 1:
+        caption = f"No separation below {CLOSE_M:g} m and no contact with an obstacle."
+    else:
+        caption = "No contact with an obstacle."
+    if shown:
+        caption += (
+            " The closest moment is framed in red. Discs are to scale, the line in a disc points "
+            "to the nose, arrows show the displacement in 1.5 s."
         )
-        return Section("encounters", "Close encounters", text)
-    caption = (
-        f"Contacts with obstacles, and separations below {CLOSE_M:g} m. The closest moment is "
-        "framed in red. Discs are to scale, the line in a disc points to the nose, arrows show "
-        "the displacement in 1.5 s. Each frame is 3.2 m wide."
-    )
     if len(found) > len(shown):
         caption += f" The {len(shown)} closest encounters of {len(found)} are shown."
     pictures = tuple(
@@ -95,10 +102,11 @@ def _encounters(
 
 def _note(encounter: Encounter) -> str:
     name, other = encounter.names
-    if encounter.other is None:
+    if encounter.is_contact:
         return f"{name} touches {other} at {encounter.time_s:.1f} s"
-    text = separation_text(encounter.separation_m)
-    return f"{name} and {other}: {text} at {encounter.time_s:.1f} s"
+    text = f"{separation_text(encounter.separation_m)} at {encounter.time_s:.1f} s"
+    is_above = encounter.separation_m >= CLOSE_M
+    return f"{name} and {other}: {text}" + f", above {CLOSE_M:g} m" * is_above
 
 
 def _curves(
@@ -143,18 +151,18 @@ def _distances(trace: FlightTrace, tracks: Tracks, shown: Sequence[Encounter]) -
 def _motion(trace: FlightTrace, flight: FlightMetrics) -> Section:
     rows = _rows_to_show(flight)
     caption = (
-        "The flown motion in the robot's colour, the navigator's commands in black. Commands that "
-        "oscillate, or that the body does not follow, cost time. A tilted LIDAR sees the floor."
+        "The flown motion in the robot's colour, the navigator's commands as thin steps. Commands "
+        "that oscillate, or that the body does not follow, cost time. A tilted LIDAR sees the "
+        "floor."
     )
     if len(rows) < len(trace.robots):
         caption += (
             f" The {len(rows)} quadcopters of {len(trace.robots)} that came closest to an "
             "obstacle or to each other are shown."
         )
-    alt = "Speed, turn rate and tilt over time"
-    return Section(
-        "motion", "Motion", caption, (picture("motion", alt, lambda: motion_picture(trace, rows)),)
-    )
+    if not rows:
+        return Section("motion", "Motion", caption)
+    return plot_section("motion", "Motion", caption, motion_plot(trace, rows))
 
 
 def _cycles(trace: FlightTrace) -> Section:
@@ -163,12 +171,7 @@ def _cycles(trace: FlightTrace) -> Section:
         if has_wall_times(trace)
         else "The recording has no wall times. The plot shows the time between control cycles."
     )
-    return Section(
-        "cycles",
-        "Control cycles",
-        caption,
-        (picture("cycles", "Times of control cycles", lambda: cycle_picture(trace)),),
-    )
+    return plot_section("cycles", "Control cycles", caption, cycle_plot(trace))
 
 
 def _rows_to_show(flight: FlightMetrics) -> List[int]:

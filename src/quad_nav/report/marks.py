@@ -57,4 +57,5 @@ def encounter_marks(
         )
         for letter, encounter in zip(LETTERS, marked)
     ]
-    return (Marks("encounter", x, y, hovers, LETTERS[: len(marked)], label="close encounter"),)
+    label = "close encounter" if any(one.is_close for one in marked) else "closest moment"
+    return (Marks("encounter", x, y, hovers, LETTERS[: len(marked)], label=label),)

@@ -9,13 +9,22 @@ from numpy.typing import NDArray
 
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.measures import Tracks
-from quad_nav.report.plot import Json, numbers, rgb, symbol_scale
+from quad_nav.report.plot import EDGE, OUTLINE, PAPER, Json, numbers, rgb, symbol_scale
 from quad_nav.report.scene_drawing import MOVING
 from quad_nav.sim.obstacles import ROUND_CORNERS
 
 _MOST_FRAMES = 200
 _FRAME_S = 0.1  # shortest time between two frames, in simulated time
 _FRAME_MS = 60  # wall time between two frames
+CONTROLS_PX = 148
+"""Height below the plot on a narrow screen: the axis, the buttons and, under them, the slider."""
+NARROW_CONTROLS: Json = {
+    "updatemenus[0].pad.t": 46,
+    "sliders[0].x": 0,
+    "sliders[0].len": 1,
+    "sliders[0].pad.t": 84,
+}
+"""Changes of the layout that put the slider below the buttons."""
 _FEWEST_CORNERS, _MOST_OUTLINES = 6, 2000  # of circles; of all obstacles, in all frames
 
 
@@ -61,7 +70,7 @@ def _obstacle_trace(frames: Sequence[Json]) -> List[Json]:
         "fill": "toself",
         "fillcolor": MOVING,
         "opacity": 0.7,
-        "line": {"color": "#7c858e", "width": 1},
+        "line": {"color": OUTLINE, "width": 1},
         "name": "moving obstacle",
         "hoverinfo": "skip",
     }
@@ -112,8 +121,8 @@ def controls(frames: Sequence[Json]) -> Json:
             {"label": "❚❚", "method": "animate", "args": [[None], jump]},
         ],
         "pad": {"t": 58, "r": 8},
-        "bgcolor": "#fff",
-        "bordercolor": "#a0a8b0",
+        "bgcolor": PAPER,
+        "bordercolor": EDGE,
     }
     return {"updatemenus": [buttons], "sliders": [{**place, **_slider(frames, jump)}]}
 

@@ -23,12 +23,24 @@ from quad_nav.sim.colours import robot_rgba
 Json = Dict[str, Any]
 
 INK, QUIET, GRID, ALARM = "#20262c", "#5a6570", "#e4e8ec", "#c01020"
+PAPER, EDGE, SOLID, OUTLINE = "#ffffff", "#a0a8b0", "#b9bfc6", "#7c858e"
+_DARK = {
+    INK: "#e3e7eb",
+    QUIET: "#a2adb8",
+    GRID: "#2b323a",
+    ALARM: "#ff6b6b",
+    PAPER: "#14181d",
+    EDGE: "#5f6a75",
+    SOLID: "#48525c",
+}
+"""Colours of a page with plots -> those that a dark screen has instead."""
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
 """Line patterns; robots with similar colours have different ones."""
 _LONGEST_TEXT = 80
 _MOST_POINTS = 40_000  # of all lines of a panel: more make the page slow
 _FULL_SIZE_UP_TO = 10  # robots; with more, symbols are smaller
 _FEWEST, _MOST = 120, 1500  # points of one line
+_LEGEND_ROW_PX, _NARROW_TOP_PX, _NARROW_LEFT_PX = 20, 40, 42
 
 
 @dataclass(frozen=True)
@@ -42,7 +54,11 @@ class Plot:
         layout: Layout of plotly.js; ``layout`` makes one in the style of the reports.
         frames: Frames of an animation.
         height_px: Height that does not depend on the width.
-        aspect: Further height, as a part of the width.
+        aspect: Further height, as a part of the width; such a plot is not higher than the screen.
+        narrow: Changes of the layout on a narrow screen, by their paths, as ``xaxis.domain``.
+        narrow_px: Height there, the legend apart; that of a wide screen if it is 0.
+        narrow_bottom_px: Height below the plot there, the legend apart; that of the layout if 0.
+        narrow_aspect: Further height there, as a part of the plot's width.
     """
 
     name: str
@@ -52,18 +68,47 @@ class Plot:
     frames: Sequence[Json] = ()
     height_px: int = 420
     aspect: float = 0.0
+    narrow: Mapping[str, Any] = field(default_factory=dict)
+    narrow_px: int = 0
+    narrow_bottom_px: int = 0
+    narrow_aspect: float = 0.0
 
     @property
     def json(self) -> str:
         """The figure as JSON that can stand between script tags."""
-        return script_json(
-            {"data": list(self.traces), "layout": self.layout, "frames": list(self.frames)}
-        )
+        figure = {"data": list(self.traces), "layout": self.layout, "frames": list(self.frames)}
+        return script_json({**figure, "narrow": {**self._below, **self.narrow}})
 
     @property
-    def height(self) -> str:
-        """The height as a value of CSS; the width is that of the page's text."""
-        return f"calc(min(100vw - 2rem, 74rem) * {self.aspect:.3f} + {self.height_px}px)"
+    def _below(self) -> Json:
+        """Place the legend below the plot, in two columns; the margins are small."""
+        bottom_px = (self.narrow_bottom_px or self.layout["margin"]["b"]) + self._legend_px
+        legend = {
+            **self.layout["legend"],
+            **{"orientation": "h", "entrywidth": 0.48, "entrywidthmode": "fraction"},
+            **{"x": 0, "xanchor": "left", "y": 0, "yanchor": "bottom", "yref": "container"},
+        }
+        margins = {"l": _NARROW_LEFT_PX, "r": 8, "t": _NARROW_TOP_PX, "b": bottom_px}
+        margins = {f"margin.{side}": size for side, size in margins.items()}
+        return {"legend": legend, **margins, "dragmode": False}
+
+    @property
+    def _legend_px(self) -> int:
+        """Height of the legend in two columns."""
+        shown = [one for one in self.traces if one.get("name") and one.get("showlegend", True)]
+        has_legend = len(self.traces) > 1 and self.layout.get("showlegend", True)
+        return _LEGEND_ROW_PX * -(-len(shown) // 2) + 12 if has_legend else 0
+
+    @property
+    def heights(self) -> str:
+        """The heights on a wide and on a narrow screen, as CSS; the width is that of the text."""
+        wide = f"calc(min(100vw - 2rem, 74rem) * {self.aspect:.3f} + {self.height_px}px)"
+        if self.aspect:
+            wide = f"min({wide}, 100vh - 1rem)"
+        around_px = (self.narrow_px or self.height_px) + self._legend_px
+        width = f"(100vw - 2rem - {_NARROW_LEFT_PX + 8}px)"
+        narrow = f"calc({width} * {self.narrow_aspect:.3f} + {around_px}px)"
+        return f"--wide: {wide}; --narrow: {narrow}"
 
 
 def script_json(value: Any) -> str:
@@ -140,7 +185,7 @@ def axis(title: str = "", **more: Any) -> Json:
     return {
         "title": {"text": title, "standoff": 6},
         "gridcolor": GRID,
-        "linecolor": "#a0a8b0",
+        "linecolor": EDGE,
         "zeroline": False,
         "automargin": True,
         **more,
@@ -155,11 +200,11 @@ def layout(**more: Any) -> Json:
             "size": 13,
             "color": INK,
         },
-        "paper_bgcolor": "#fff",
-        "plot_bgcolor": "#fff",
+        "paper_bgcolor": PAPER,
+        "plot_bgcolor": PAPER,
         "margin": {"l": 56, "r": 12, "t": 28, "b": 44},
         "hovermode": "closest",
-        "hoverlabel": {"bgcolor": "#fff", "font": {"color": INK, "size": 13}, "align": "left"},
+        "hoverlabel": {"bgcolor": PAPER, "font": {"color": INK, "size": 13}, "align": "left"},
         "legend": {"groupclick": "togglegroup", "tracegroupgap": 0, "font": {"size": 12}},
         "barmode": "overlay",
         "bargap": 0,
@@ -190,7 +235,8 @@ def plot_scripts() -> Scripts:
     # Imported here: pages without plots need no plotly.
     from plotly.offline import get_plotlyjs
 
-    texts = (get_plotlyjs().replace("\r\n", "\n"), _DRAW % script_json(_CONFIG))
+    draw = _DRAW % (script_json(_CONFIG), script_json(_DARK))
+    texts = (get_plotlyjs().replace("\r\n", "\n"), draw)
     return Scripts(texts, tuple(map(_hash, texts)))
 
 
@@ -208,23 +254,30 @@ _CONFIG: Mapping[str, Any] = {
     "modeBarButtonsToRemove": ["sendChartToCloud", "select2d", "lasso2d", "autoScale2d"],
     "toImageButtonOptions": {"format": "svg"},
 }
-# The paper is narrower than the screen; a plot has to be drawn again before it is printed.
+# The paper is white, and narrower than the screen; a plot is drawn again before it is printed.
 _DRAW = """
 (() => {
   const config = %s;
+  const dark = %s;
+  const isDark = matchMedia("(prefers-color-scheme: dark)");
+  const isNarrow = matchMedia("(max-width: 40rem)");
   const plots = [...document.querySelectorAll(".plot")];
-  for (const element of plots) {
-    const figure = JSON.parse(document.getElementById("figure-" + element.id).textContent);
+  function draw(element, onPaper) {
+    let text = document.getElementById("figure-" + element.id).textContent;
+    if (isDark.matches && !onPaper)
+      text = text.replace(/#[0-9a-f]{6}/g, colour => dark[colour] || colour);
+    const {narrow, ...figure} = JSON.parse(text);
+    if (onPaper) Object.assign(figure.layout, {width: 680, autosize: false});
     const options = {...config, toImageButtonOptions: {format: "svg", filename: element.id}};
     element.textContent = "";
     Plotly.newPlot(element, {...figure, config: options});
+    if (isNarrow.matches && !onPaper) Plotly.relayout(element, narrow);
   }
-  window.addEventListener("beforeprint", () => {
-    for (const element of plots) Plotly.relayout(element, {width: 680, autosize: false});
-  });
-  window.addEventListener("afterprint", () => {
-    for (const element of plots) Plotly.relayout(element, {width: null, autosize: true});
-  });
+  const drawAll = onPaper => plots.forEach(element => draw(element, onPaper));
+  drawAll(false);
+  for (const query of [isDark, isNarrow]) query.addEventListener("change", () => drawAll(false));
+  window.addEventListener("beforeprint", () => drawAll(true));
+  window.addEventListener("afterprint", () => drawAll(false));
 })();
 """
 

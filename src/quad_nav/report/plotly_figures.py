@@ -10,11 +10,14 @@ from quad_nav.report.distances import SHOWN_M, Curve, Panel
 from quad_nav.report.marks import Hover, Marks
 from quad_nav.report.measures import speed_mps
 from quad_nav.report.paths import FlownPath, PathsMap
-from quad_nav.report.paths_animation import animation, controls
+from quad_nav.report.paths_animation import CONTROLS_PX, NARROW_CONTROLS, animation, controls
 from quad_nav.report.plot import (
     ALARM,
     INK,
+    OUTLINE,
+    PAPER,
     QUIET,
+    SOLID,
     Json,
     Plot,
     axis,
@@ -68,6 +71,7 @@ def paths_plot(content: PathsMap) -> Plot:
         frames, moving = animation(*content.flight, len(traces))
         traces += moving
     margins = {"l": 50, "r": 12, "t": 28, "b": 100 if frames else 44}
+    below_px = CONTROLS_PX if frames else 44
     return Plot(
         "paths",
         content.alt,
@@ -81,6 +85,10 @@ def paths_plot(content: PathsMap) -> Plot:
         frames,
         150 if frames else 90,
         0.84 * content.height(1.0),
+        NARROW_CONTROLS if frames else {},
+        40 + below_px,
+        below_px,
+        content.height(1.6),
     )
 
 
@@ -150,8 +158,8 @@ def _scene_traces(scene: Optional[Scene]) -> List[Json]:
         outlines(scene) if scene is not None else ((), ()),
         ("obstacle or wall", "below or above<br>the flying altitude"),
         (
-            {"fillcolor": "#b9bfc6", "line": {"color": "#7c858e", "width": 1}},
-            {"fillcolor": "rgba(0,0,0,0)", "line": {"color": "#7c858e", "width": 1, "dash": "dot"}},
+            {"fillcolor": SOLID, "line": {"color": OUTLINE, "width": 1}},
+            {"fillcolor": "rgba(0,0,0,0)", "line": {"color": OUTLINE, "width": 1, "dash": "dot"}},
         ),
     ):
         if not shapes:
@@ -233,7 +241,7 @@ def _panel_traces(panel: Panel, names: Sequence[str], axis_name: str, is_first: 
                 )
             )
     if panel.is_crowded and panel.least is not None and np.isfinite(panel.least.values).any():
-        style = {"line": {"color": "#000", "width": 2}, "hoverinfo": "skip", **place}
+        style = {"line": {"color": INK, "width": 2}, "hoverinfo": "skip", **place}
         name = "smallest of all"
         found.append(_curve(panel.least, count, True, name=name, legendgroup="smallest", **style))
     return found + [_marks_trace(marks, axis_name=axis_name) for marks in panel.marks]
@@ -303,7 +311,7 @@ def _bars_trace(series: Bars) -> Json:
         "textposition": "inside",
         "insidetextanchor": "middle",
         "textangle": 0,
-        "textfont": {"size": 11},
+        "textfont": {"size": 11, "color": [INK if bar.is_pale else "#fff" for bar in bars]},
         "constraintext": "none",
         "marker": {"color": series.colour} if series.colour else _goal_style(series),
         "hovertext": [_hover_text(bar.hover) for bar in bars],
@@ -315,7 +323,7 @@ def _goal_style(series: Bars) -> Json:
     return {
         "color": [rgb(bar.number or 0, _PALE if bar.is_pale else 1.0) for bar in series.bars],
         "line": {
-            "color": ALARM if series.is_failure else "#fff",
+            "color": ALARM if series.is_failure else PAPER,
             "width": 2 if series.is_failure else 1,
         },
         "pattern": {"shape": "/" if series.is_hatched else "", "fgcolor": "#fff"},

@@ -39,6 +39,7 @@ _LETHAL_RGB, _INSCRIBED_RGB, _UNKNOWN_RGB = (255, 0, 255), (0, 255, 255), (112, 
 _INFLATED_RGB = (0, 0, 255)
 _ALPHA = 0.35
 _AROUND_GOAL_M = 0.6  # shown around goals outside of the scene
+_MARGIN = 0.1  # widest margin for such goals, in parts of the scene's larger side
 
 
 def cost_colours(costs: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -70,7 +71,10 @@ def costmap_extent(costmap: LayeredCostmap) -> Extent:
 
 
 def shown_area(preview: MissionPreview, robots: Sequence[RobotPreview]) -> Extent:
-    """Return the area that holds scene and goals, (x from, x to, y from, y to) in ``map``."""
+    """Return the area that holds scene and goals, (x from, x to, y from, y to) in ``map``.
+
+    Goals far outside of the scene, such as one at 90 instead of 9, are not in it.
+    """
     scene = preview.scene
     places = [
         (goal.x_m + side * _AROUND_GOAL_M, goal.y_m + side * _AROUND_GOAL_M)
@@ -81,6 +85,11 @@ def shown_area(preview: MissionPreview, robots: Sequence[RobotPreview]) -> Exten
     ]
     if scene is not None:
         edge_m = scene.walls.thickness_m
+        margin_m = max(_MARGIN * max(scene.size_x_m, scene.size_y_m), _AROUND_GOAL_M)
+        low = np.array([scene.origin_x_m, scene.origin_y_m]) - margin_m
+        high = np.array([scene.end_x_m, scene.end_y_m]) + margin_m
+        clipped = np.clip(np.reshape(places, (-1, 2)), low, high)
+        places = [(x_m, y_m) for x_m, y_m in clipped.tolist()]
         places += [
             (scene.origin_x_m - edge_m, scene.origin_y_m - edge_m),
             (scene.end_x_m + edge_m, scene.end_y_m + edge_m),
@@ -157,18 +166,22 @@ def _draw_goal(
     scale: float,
 ) -> None:
     fault = robot.faults[index]
+    place, aim, far = _at_edge(axes, place)
     tint: Any = ALARM if fault else colour(robot.number)
     if yaw_rad is not None:
         ahead = (16 * scale * np.cos(yaw_rad), 16 * scale * np.sin(yaw_rad))
         arrow = {"arrowstyle": "<|-", "color": tint, "lw": 1.5, "shrinkA": 0, "shrinkB": 7 * scale}
         axes.annotate("", place, ahead, textcoords="offset points", arrowprops=arrow, zorder=8)
+    if far:
+        arrow = {"arrowstyle": "-|>", "color": tint, "lw": 1.5, "shrinkA": 7 * scale, "shrinkB": 0}
+        axes.annotate("", aim, place, textcoords="data", arrowprops=arrow, zorder=8)
     face = "white" if fault else tint
     axes.plot(*place, "o", ms=15 * scale, color=face, mec=tint, mew=1.8 * scale, zorder=9)
     centred_text(axes, place, str(index + 1), 9 * scale, tint if fault else "white", zorder=10)
     if fault:
         is_left = place[0] < sum(axes.get_xlim()) / 2
         axes.annotate(
-            fault.split(";")[0],
+            far + fault.split(";")[0],
             place,
             (11 * scale if is_left else -11 * scale, 8 * scale),
             textcoords="offset points",
@@ -179,6 +192,22 @@ def _draw_goal(
             zorder=12,
             annotation_clip=True,
         )
+
+
+def _at_edge(axes: Axes, place: Tuple[float, float]) -> Tuple[Tuple[float, float], Any, str]:
+    """Return where a goal is drawn, and for one outside of the picture an arrow's end and a text.
+
+    It stands beside the edge, and the arrow and the text say where it is.
+    """
+    (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
+    inset_m = 0.05 * max(x1 - x0, y1 - y0)
+    x_m = min(max(place[0], x0 + inset_m), x1 - inset_m)
+    y_m = min(max(place[1], y0 + inset_m), y1 - inset_m)
+    if x0 <= place[0] <= x1 and y0 <= place[1] <= y1:
+        return place, None, ""
+    ahead = np.array(place) - (x_m, y_m)
+    aim = (x_m, y_m) + 0.9 * inset_m * ahead / np.hypot(*ahead)
+    return (x_m, y_m), tuple(aim), f"({place[0]:g}, {place[1]:g}) "
 
 
 def _symbols(costmap: Optional[LayeredCostmap], has_faults: bool, has_moving: bool) -> List[Any]:

@@ -13,7 +13,7 @@ from quad_nav.config import Configuration
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.goal_file import GoalSequence, PlaceCheck, load_goals
+from quad_nav.mission.goal_file import GoalSequence, PlaceCheck, readable_goals
 from quad_nav.mission.robot_goals import GoalSource, goal_paths
 from quad_nav.scenario.flight_setup import (
     FlightOptions,
@@ -25,6 +25,7 @@ from quad_nav.scenario.goal_checks import place_check
 from quad_nav.scenario.goal_plans import GoalPlans
 from quad_nav.sim.movers import Movers
 from quad_nav.sim.obstacles import Obstacle
+from quad_nav.sim.scene_file import readable_scene
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,9 @@ class MissionPreview:
             parts = read_readable_parts(options)
             self.problems, self.warnings = tuple(error.problems), parts.warnings
             self.scene, robots = parts.scene, parts.robots
+            file = with_default_files(options).scene
+            if self.scene is None and file is not None:
+                self.scene = readable_scene(file)
             self.robot_radius_m = parts.robot_radius_m
             configurations: Sequence[Optional[Configuration]] = parts.configurations
         else:
@@ -104,13 +108,11 @@ class MissionPreview:
             return ()
 
     def _read_faulty_files(self, sources: Mapping[int, GoalSource]) -> None:
-        """Read the goals of files in which only positions are faulty."""
+        """Read what can be read of faulty files, whose faults are among the problems."""
         for number, (path, robot) in sources.items():
-            if number not in self._sequences:
-                try:
-                    self._sequences[number] = load_goals(path, robot=robot)
-                except InputError:
-                    continue  # its faults are among the problems
+            sequence = None if number in self._sequences else readable_goals(path, robot)
+            if sequence is not None:
+                self._sequences[number] = sequence
 
     @property
     def numbers(self) -> List[int]:

@@ -83,6 +83,24 @@ def load_scene(path: Union[str, Path], goals: Sequence[Place] = ()) -> Scene:
     Raises:
         InputError: The file cannot be read, or has faults; lists all of them.
     """
+    document, path, folder = _read_document(path)
+    return scene_from_document(document, str(path), path.stem, folder, goals)
+
+
+def readable_scene(path: Union[str, Path]) -> Optional[Scene]:
+    """Read the parts of a scene file that have no faults, to show them.
+
+    ``load_scene`` has the faults. None if the arena's size is among them.
+    """
+    try:
+        document, path, folder = _read_document(path)
+    except InputError:
+        return None
+    return _read_scene(Checker(str(path)), document, path.stem, folder, ())
+
+
+def _read_document(path: Union[str, Path]) -> Tuple[Any, Path, Path]:
+    """Return the document, the path, and the folder of the files that it refers to."""
     path = Path(os.path.expanduser(path))
     place = path.resolve() if path.is_symlink() else path  # other files are relative to the target
     if path.suffix in _WORLD_SUFFIXES:
@@ -91,7 +109,7 @@ def load_scene(path: Union[str, Path], goals: Sequence[Place] = ()) -> Scene:
         document = read_yaml(path)
         if isinstance(document, dict) and "image" in document:
             document = {"map": place.name}
-    return scene_from_document(document, str(path), path.stem, place.parent, goals)
+    return document, path, place.parent
 
 
 def scene_from_document(
@@ -159,7 +177,8 @@ def _read_scene(
         return _with_chosen_starts(check, scene, imported, goals)
     if arena_is_sound:
         _check_starts(check, scene, starts)
-    return scene
+        return scene
+    return None
 
 
 def _read_walls(check: Checker, fields: Dict[str, Any]) -> Walls:

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Sequence
 
 from quad_nav.report.page import Page, render
+from quad_nav.report.panels import plot_section
 from quad_nav.versions import versions
-from quad_tune.report.panels import plot_section
 from quad_tune.report.sweep_measures import EXPLANATIONS, axis_note, is_numeric
 from quad_tune.report.sweep_plot import sweep_plot
 from quad_tune.study_text import format_value

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, List, Sequence, Tuple
 
+from quad_nav.report.panels import Panel, panel_plot
 from quad_nav.report.plot import ALARM, INK, QUIET, Json, Plot, axis, plot_text, rgb
-from quad_tune.report.panels import Panel, panel_plot
 from quad_tune.report.sweep_measures import (
     MEASURES,
     Estimate,
@@ -117,7 +117,7 @@ def _map(
         "opacity": 0.8,
         "text": [[_cell_text(one, measure) if show else "" for one in line] for line in found],
         "texttemplate": "%{text}",
-        "textfont": {"color": INK, "size": 12},
+        "textfont": {"color": "#111", "size": 12},  # also on a dark screen: cells are coloured
         "hovertext": [_hovers(line, measure, own) for line, own in zip(table, found)],
         "hovertemplate": "%{hovertext}<extra></extra>",
         "hoverongaps": False,

@@ -12,10 +12,10 @@ from quad_nav.report.flight_metrics import flight_metrics
 from quad_nav.report.matplotlib_figures import paths_picture, timeline_picture
 from quad_nav.report.measures import resampled_tracks
 from quad_nav.report.page import MAX_STRIPS, Page, Section, picture, render
+from quad_nav.report.panels import plot_section
 from quad_nav.report.paths import flown_paths
 from quad_nav.report.timeline import timeline
 from quad_tune import study_text
-from quad_tune.report.panels import plot_section
 from quad_tune.report.tune_plots import (
     held_out_plot,
     history_plot,

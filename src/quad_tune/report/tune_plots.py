@@ -9,9 +9,9 @@ import numpy as np
 import optuna
 from optuna.trial import FrozenTrial
 
+from quad_nav.report.panels import Panel, panel_plot
 from quad_nav.report.plot import ALARM, INK, QUIET, Json, Plot, axis, layout, plot_text, rgb
 from quad_tune.flight_result import FlightResult
-from quad_tune.report.panels import Panel, panel_plot
 from quad_tune.search import is_complete
 from quad_tune.space import Dimension, SearchSpace
 from quad_tune.statistics import FlightStatistics, mean_interval

@@ -87,6 +87,36 @@ def test_faulty_goals_are_shown_with_the_fault_that_fly_reports(hall):
     assert [len(plan) > 0 for plan in robot.plans] == [True, False, False]
 
 
+def test_a_goal_far_away_leaves_the_arena_its_size(hall):
+    """90 instead of 9: an arrow at the edge, in an area with a margin of a tenth of 8 m."""
+    write_goals(hall, 0, [[1.0, 5.0], [90.0, 3.0]])
+    preview = MissionPreview(hall)
+    robots = [preview.robot(number) for number in preview.numbers]
+    assert page_data(preview, robots, "")["area"] == pytest.approx([-0.1, 8.8, -0.1, 6.1])
+    (axes,) = preview_picture(preview, robots, "").axes
+    (text,) = [one for one in axes.texts if "outside" in one.get_text()]
+    assert text.get_text() == "(90, 3) is outside the arena"
+    assert text.xy == pytest.approx((8.8 - 0.05 * 8.9, 3.0))
+
+
+def test_files_with_a_bad_key_show_what_can_be_read(hall):
+    hall.scene.write_text(SCENE.replace("altitude", "altitud"))
+    (hall.goals / "quad0_goals.json").write_text(
+        '{"goals": [[1, 5], [1, "x"], [7, 5]], "retry": 1}'
+    )
+    preview = MissionPreview(hall)
+    assert [line.partition(": ")[2].partition(":")[0] for line in preview.problems] == [
+        "altitud",
+        "retry",
+        "goals[1] (goal 2)",
+    ]
+    assert preview.scene is not None and len(preview.scene.obstacles) == 1
+    assert preview.numbers == [0, 1]
+    assert [goal.y_m for goal in preview.robot(0).sequence.goals] == [5.0]  # up to the bad one
+    hall.scene.write_text(SCENE.replace("size", "siz"))
+    assert MissionPreview(hall).scene is None
+
+
 def test_goals_are_checked_with_the_body_of_the_configuration(hall):
     write_goals(hall, 0, [[4.0, 3.9]])
     wide = replace(hall, parameters=(("body_radius", 0.45),))

@@ -9,7 +9,7 @@ import pytest
 from hand_made_traces import TIMES_S, flight, robot
 
 from quad_nav.report.encounter_picture import encounter_picture, frame_times
-from quad_nav.report.encounters import encounters, separation_text
+from quad_nav.report.encounters import closest_moment, encounters, separation_text
 from quad_nav.report.matplotlib_figures import paths_picture
 from quad_nav.report.measures import resampled_tracks
 from quad_nav.report.paths import flown_paths
@@ -34,6 +34,18 @@ def test_two_pass_each_other():
     assert found_in(passing(1.2)) == ()
     assert len(found_in(passing(1.2), below_m=0.7)) == 1
     assert found_in(flight(robot(0, (1.0, 1.0)))) == found_in(flight()) == ()
+
+
+def test_a_flight_without_encounters_has_a_closest_moment():
+    trace = passing(3.0)
+    tracks = resampled_tracks(trace)
+    (one,) = closest_moment(trace, tracks)
+    assert (one.robot, one.other, one.is_close) == (0, 1, False)
+    assert (one.time_s, one.separation_m) == (pytest.approx(5.0), pytest.approx(2.4))
+    assert (one.x_m, one.y_m) == (pytest.approx(3.5), pytest.approx(3.5))
+    (left, right), *_ = [axes.get_xlim() for axes in encounter_picture(trace, tracks, one).axes]
+    assert right - left == pytest.approx(2.4 + 6 * 0.3)  # both are inside
+    assert closest_moment(flight(), resampled_tracks(flight())) == ()
 
 
 def test_what_repeats_soon_is_one_encounter():

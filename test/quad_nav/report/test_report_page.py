@@ -17,6 +17,7 @@ from matplotlib.text import Text
 from PIL import Image
 from report_pages import Parsed, assert_loads_nothing, figures_of
 
+from quad_nav.mission.goal import Goal
 from quad_nav.report.animation import animate_flight, animation_faults
 from quad_nav.report.flight_page import flight_page
 from quad_nav.report.page import MAX_STRIPS, Page, write_pictures
@@ -24,7 +25,7 @@ from quad_nav.report.plot import plot_scripts
 
 SECTIONS = "paths encounters gaps timeline motion cycles goal-table parameters".split()
 PICTURES = ["paths", "distances", "timeline", "motion", "cycles"]
-PLOTS = ["paths", "distances", "timeline"]
+PLOTS = ["paths", "distances", "timeline", "motion", "cycles"]
 NOBODY = np.empty(0)
 
 
@@ -47,7 +48,13 @@ def test_page_of_so_many(count):
     figures = figures_of(page.html)
     assert list(figures) == PLOTS
     if count < 20:  # slow with more
-        assert all(plotly.graph_objects.Figure(figure).data for figure in figures.values())
+        for figure in figures.values():
+            narrow = figure.pop("narrow")
+            assert {re.split(r"[.\[]", path)[0] for path in narrow} <= {
+                *figure["layout"],
+                "dragmode",
+            }
+            assert plotly.graph_objects.Figure(figure).data
     assert "5.0 ×" in page.html  # ten seconds in two
     # Most of a page is plotly.js, 4.8 MB.
     assert count > 2 or len(page.html) - sum(map(len, plot_scripts().texts)) < 5e5
@@ -55,6 +62,12 @@ def test_page_of_so_many(count):
 
 def straight(*goals):
     return flight(robot(0, (1.0, 1.0), (0.3, 0.0), goals=goals))
+
+
+def cut(*goals):
+    """A recording of a mission of two goals; nothing says that it has ended."""
+    mission = (Goal(4.0, 1.0), Goal(9.0, 1.0))
+    return flight(robot(0, (1.0, 1.0), (0.3, 0.0), goals=goals, mission=mission))
 
 
 DONE = goal(0, (4.0, 1.0), 0.0, 10.0)
@@ -73,7 +86,26 @@ TURNED = replace(DONE, yaw_error_rad=-0.12)
             lambda: flight_page(straight(TURNED, goal(1, (4.0, 1.0), 10.0, 12.0))),
             ['<th class="n">yaw error (rad)</th>', '<td class="n">-0.12</td>'],
         ),
-        (lambda: flight_page(straight(DONE)), ["Mission completed", "No contact with an obstacle"]),
+        (
+            lambda: flight_page(straight(DONE)),
+            [
+                "Mission completed",
+                "No contact with an obstacle. The closest moment",
+                "A: quad0 and the nearest obstacle or wall: gap 0.70 m at 0.0 s, above 0.5 m",
+            ],
+        ),
+        (
+            lambda: flight_page(cut(DONE, goal(1, (9.0, 1.0), 10.0))),
+            [
+                '<span class="verdict unclear">Mission not complete</span>\n'
+                " recording covers 0.0 to 10.0 s; mission not complete</p>"
+            ],
+        ),
+        (lambda: flight_page(cut(DONE)), ["Mission not complete", "recording covers"]),
+        (
+            lambda: flight_page(cut(goal(0, (9.0, 1.0), 0.0, 5.0, False, "no path"))),
+            ["Mission failed", "mission not complete; 1 of 1 goals not reached"],
+        ),
     ],
 )
 def test_what_the_page_says(page, texts):

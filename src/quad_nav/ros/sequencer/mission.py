@@ -10,7 +10,8 @@ import contextlib
 import threading
 import time
 from dataclasses import replace
-from typing import Dict, Iterator, List, Optional, Sequence, Tuple
+from functools import partial
+from typing import Dict, Iterator, List, Optional, Sequence
 
 import rospy
 from nav_msgs.msg import Odometry
@@ -139,7 +140,13 @@ class MissionRunner:
     def viewers(self) -> List[Need]:
         """Return a condition for each viewer: it hears what this node publishes."""
         topics = (self._goals.resolved_name, self._flight.resolved_name)
-        return [_viewer_need(node, topics) for node in self._setup.viewers]
+        return [
+            Need(
+                partial(readiness.hears, node, topics),
+                partial("{}: is not ready to show the flight".format, node),
+            )
+            for node in self._setup.viewers
+        ]
 
     def start(self) -> None:
         """Start the simulation or the vehicles, and begin or resume the mission.
@@ -355,12 +362,6 @@ def _topics_may_close() -> Iterator[None]:
         # is_shutdown() turns true only after the topics have been closed.
         if not rospy.core.is_shutdown_requested():
             raise
-
-
-def _viewer_need(node: str, topics: Tuple[str, ...]) -> Need:
-    return Need(
-        lambda: readiness.hears(node, topics), lambda: f"{node}: is not ready to show the flight"
-    )
 
 
 def _robot_needs(robot: MissionRobot, feed: StateFeed) -> List[Need]:

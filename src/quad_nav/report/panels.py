@@ -54,7 +54,32 @@ def panel_plot(
         titles.append({"text": f"<b>{panel.title}</b>", **place, **corner})
     margin = {"l": 56, "r": 12, "t": _TOP_PX, "b": _BOTTOM_PX}
     style = layout(**axes, annotations=titles, showlegend=legend, margin=margin)
-    return Plot(name, alt, traces, style, height_px=plot_px + _TOP_PX + _BOTTOM_PX)
+    around_px = _TOP_PX + _BOTTOM_PX
+    changes, column_px = _one_column(len(panels), panel_px)
+    return Plot(
+        name,
+        alt,
+        traces,
+        style,
+        height_px=plot_px + around_px,
+        narrow={**changes, "margin.t": _TOP_PX},
+        narrow_px=column_px + around_px,
+    )
+
+
+def _one_column(count: int, panel_px: int) -> Tuple[Json, int]:
+    """Return the changes of a layout that put all panels below each other, and their height."""
+    total_px = count * panel_px + (count - 1) * _GAP_PX
+    changes: Json = {}
+    for k in range(count):
+        top = 1.0 - k * (panel_px + _GAP_PX) / total_px
+        suffix = "" if k == 0 else str(k + 1)
+        changes[f"xaxis{suffix}.domain"] = [0.0, 1.0]
+        changes[f"yaxis{suffix}.domain"] = [max(top - panel_px / total_px, 0.0), top]
+        changes[f"yaxis{suffix}.showticklabels"] = True
+        changes[f"annotations[{k}].x"] = 0.0
+        changes[f"annotations[{k}].y"] = top
+    return changes, total_px
 
 
 def plot_section(anchor: str, heading: str, caption: str, plot: Plot) -> Section:
@@ -199,6 +224,8 @@ def _scale(axes: Axes, given: Json, side: str) -> None:
     axis.set_label_text(_words(given["title"]["text"]))
     if given.get("type") == "log":
         getattr(axes, f"set_{side}scale")("log")
+        if "range" in given:
+            set_limits(*(10.0**end for end in given["range"]))
         label_log(axis)
     elif "range" in given:
         set_limits(*given["range"])
