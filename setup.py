@@ -17,7 +17,7 @@ runpy.run_path(str(ROOT / "scripts" / "check_python.py"), run_name="__main__")
 # Files that `quad_nav.files.shipped` finds by name. CMakeLists.txt installs them for catkin.
 SHIPPED = sorted(
     path.relative_to(ROOT)
-    for folder in ("config", "goals", "msg", "scenes", "spaces")
+    for folder in ("config", "goals", "localization", "msg", "scenes", "spaces")
     for path in (ROOT / folder).rglob("*.*")
     if path.is_file()
 )

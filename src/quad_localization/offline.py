@@ -56,7 +56,7 @@ class AmclLocalization:
         Raises:
             InputError: The shipped parameters have faults.
         """
-        path = shipped("config", "amcl.yaml")
+        path = shipped("localization", "amcl.yaml")
         params, faults = read_params(read_yaml(path))
         if faults:
             raise InputError([f"{path}: {fault}" for fault in faults])

@@ -78,7 +78,7 @@ class Commands(click.Group):
             with _escaped_messages():
                 return super().invoke(ctx)
         except KeyboardInterrupt:
-            click.echo("interrupted", err=True)
+            print(printable("interrupted"), file=sys.stderr)
             ctx.exit(EXIT_INTERRUPTED)
 
     def main(self, *args: Any, **kwargs: Any) -> Any:

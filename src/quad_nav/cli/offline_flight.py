@@ -80,8 +80,8 @@ def fly_mission(
             quiet=quiet,
             suffixes={"--report": HTML},
         )
-        localization, errors = _localization(given.pop("localization"))
-        options = replace(_options(**given), localization=localization)
+        localization = given.pop("localization")
+        options = replace(_options(**given), localization=_localization(localization))
         with clock("reading the mission", quiet):
             setup = read_setup(options)
         page = _page(served) if web else None
@@ -89,21 +89,26 @@ def fly_mission(
     while True:
         with exit_on_faults():
             drawn = FlightPictures(setup, outputs)
-            observers = [*_observers(record), *errors]
-            if not quiet:
-                _show_warnings(setup)
+            observers = _observers(record, localization)
+            _show_warnings(setup, quiet)
             facts = offline_facts(options, setup, ["quad", *sys.argv[1:]])
             status = _fly(setup, facts, observers, outputs, drawn, quiet, processes, page)
         if page is None or status == EXIT_INTERRUPTED or not _is_wanted_again(page):
             break
         with exit_on_faults():
             setup = read_setup(options)  # the goal files may have changed
-    if page is not None:
-        page.close()
+    _close(page)
     sys.exit(status)
 
 
-def _show_warnings(setup: FlightSetup) -> None:
+def _close(page: Optional[FlightPage]) -> None:
+    if page is not None:
+        page.close()
+
+
+def _show_warnings(setup: FlightSetup, quiet: bool) -> None:
+    if quiet:
+        return
     with clock("looking for plans", quiet=False):
         unreachable = unreachable_goals(setup)
     show_warnings((*setup.warnings, *unreachable))
@@ -175,21 +180,28 @@ def mission_options(parameters: Tuple[str, ...], **given: Any) -> FlightOptions:
     return options
 
 
-def _localization(name: str) -> Tuple[Optional[LocalizationMaker], List[Any]]:
-    """Return what finds the robots' places, and the observer that measures its errors."""
+def _localization(name: str) -> Optional[LocalizationMaker]:
+    """Return what finds the robots' places; None for the simulator, which knows them."""
     if name == "simulator":
-        return None, []
-    module = add_ons.load("quad_localization.offline", "--localization")
-    return module.MAKERS[name], [module.LocalizationErrors()]
+        return None
+    maker: LocalizationMaker = _localizations().MAKERS[name]
+    return maker
 
 
-def _observers(record: Optional[Path]) -> List[FlightObserver]:
-    """Create the recorder, if there is to be one; imported here, because it loads slowly."""
-    if record is None:
-        return []
-    from quad_nav.recording.recorder import Recorder
+def _localizations() -> Any:
+    return add_ons.load("quad_localization.offline", "--localization")
 
-    return [Recorder(record)]
+
+def _observers(record: Optional[Path], localization: str) -> List[FlightObserver]:
+    """Create the recorder, which loads slowly, and what measures the errors of a localization."""
+    observers: List[FlightObserver] = []
+    if localization != "simulator":
+        observers.append(_localizations().LocalizationErrors())
+    if record is not None:
+        from quad_nav.recording.recorder import Recorder
+
+        observers.append(Recorder(record))
+    return observers
 
 
 def _fly(

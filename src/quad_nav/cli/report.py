@@ -66,12 +66,8 @@ def report(
     from quad_nav.report.flight_page import flight_page
 
     try:
-        outputs = Outputs(
-            {"--output": output},
-            {"--animate": animate},
-            {"--pictures": pictures},
-            suffixes={"--output": HTML},
-        )
+        names = {"--output": output}, {"--animate": animate}, {"--pictures": pictures}
+        outputs = Outputs(*names, suffixes={"--output": HTML})
         faults = animation.animation_faults(animate, len(flights)) if animate is not None else []
         if len(flights) == 1:
             (trace,) = _read(flights, lambda trace: trace, faults)

@@ -14,7 +14,7 @@ import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple, Union
+from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple, Union
 
 import numpy as np
 
@@ -33,6 +33,7 @@ from quad_nav.mission.goal import (
     read_goal,
     show,
 )
+from quad_nav.mission.place_check import PlaceCheck
 from quad_nav.mission.waypoint_list import WaypointList, read_waypoints
 
 MAX_BYTES = 4 * 1024 * 1024
@@ -41,9 +42,6 @@ DEFAULT_YAW_TOLERANCE_RAD = 0.1
 """Tolerance of a robot whose local planner is unknown or has no ``yaw_goal_tolerance``."""
 
 _OWN_NAME = re.compile(r"quad\d+_goals\.json$")
-
-PlaceCheck = Callable[[float, float], Optional[str]]
-"""Returns what is wrong with a position (x, y) in ``map``, or None if a robot fits there."""
 
 
 @dataclass(frozen=True)
@@ -247,37 +245,6 @@ def read_settings(
     if "retries" in fields:
         fields["retries"] = int(fields["retries"])
     return dataclasses.replace(defaults, **fields), []
-
-
-def clearance_check(
-    contains: Callable[[float, float], bool],
-    clearance_m: Callable[[float, float], float],
-    robot_radius_m: float,
-    arena: str = "the arena",
-) -> PlaceCheck:
-    """Make a check for positions in the arena at least a robot's radius from everything.
-
-    Args:
-        contains: Test for a position (x, y) in the arena.
-        clearance_m: Distance from a position (x, y) to the nearest surface, negative inside.
-        robot_radius_m: The robot's radius.
-        arena: Description of the arena, for messages.
-    """
-
-    def check(x_m: float, y_m: float) -> Optional[str]:
-        if not contains(x_m, y_m):
-            return f"is outside the arena; expected a place in {arena}"
-        clearance = clearance_m(x_m, y_m)
-        if clearance <= 0.0:
-            return f"is inside an obstacle; expected {robot_radius_m:.2f} m of free space around it"
-        if clearance < robot_radius_m:
-            return (
-                f"is {clearance:.2f} m from an obstacle or a wall; "
-                f"expected at least the robot's radius, {robot_radius_m:.2f} m"
-            )
-        return None
-
-    return check
 
 
 def goals_of(

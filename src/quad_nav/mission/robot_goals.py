@@ -15,10 +15,10 @@ from quad_nav.mission.goal_file import (
     DEFAULT_SETTINGS,
     MAX_BYTES,
     GoalSequence,
-    PlaceCheck,
     SequenceSettings,
     load_goals,
 )
+from quad_nav.mission.place_check import PlaceCheck
 from quad_nav.mission.waypoint_list import read_waypoints
 
 _SUFFIXES = {".json", ".yaml", ".yml", ".csv", ".txt", ".plan", ".waypoints"}

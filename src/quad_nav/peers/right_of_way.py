@@ -76,8 +76,7 @@ def find_conflict(
     """Find the peer of highest priority that the robot has to yield to.
 
     A robot goes on if that takes it out of the peer's way in time. It does not wait for a
-    stationary peer, but makes room on its path, because it may be the reason why the peer stands:
-    far away only a parked robot on the end of that path, which no plan leads around.
+    stationary peer, but makes room on its path; far away only if it is parked on that path's end.
 
     Args:
         position: Position of the robot, float64[2], metres in ``map``.
@@ -91,15 +90,14 @@ def find_conflict(
     Returns:
         The peer and how to yield to it, None to go on.
     """
-    before = [p for p in peers if p.intention.priority > priority and not p.is_parked]
+    before = _before(priority, peers)
     if not before:
         return None
     own = predict_positions(position, path, cruise_mps, _TIMES_S)
-    for peer in sorted(before, key=lambda peer: -peer.intention.priority):
+    for peer in before:
         stands = peer.name in stationary
-        if stands and np.hypot(*(peer.position - position)) > _BLOCKING_FACTOR * min_separation_m:
-            end = peer.intention.path[-1]
-            if not len(path) and np.hypot(*(end - position)) < min_separation_m:
+        if stands and _distance_m(peer, position) > _BLOCKING_FACTOR * min_separation_m:
+            if not len(path) and _ends_at(peer, position, min_separation_m):
                 return peer, Yield.MAKE_ROOM
             continue
         theirs = predict_peer(peer, cruise_mps)
@@ -108,6 +106,22 @@ def find_conflict(
             if is_on_path or not stands:
                 return peer, Yield.MAKE_ROOM if is_on_path else Yield.WAIT
     return None
+
+
+def _before(priority: float, peers: Sequence[Peer]) -> List[Peer]:
+    """Return the peers with a higher priority that are not parked, the highest first."""
+    before = [p for p in peers if p.intention.priority > priority and not p.is_parked]
+    return sorted(before, key=lambda peer: -peer.intention.priority)
+
+
+def _distance_m(peer: Peer, position: NDArray[np.float64]) -> float:
+    return float(np.hypot(*(peer.position - position)))
+
+
+def _ends_at(peer: Peer, position: NDArray[np.float64], min_separation_m: float) -> bool:
+    """Return whether the path of a peer ends nearer to a position, float64[2], than it may."""
+    path = peer.intention.path
+    return bool(len(path)) and bool(np.hypot(*(path[-1] - position)) < min_separation_m)
 
 
 def meets(

@@ -10,7 +10,8 @@ from quad_nav.config import Configuration
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.files.values import MAX_MEMORY_BYTES
-from quad_nav.mission.goal_file import PlaceCheck, SequenceSettings, clearance_check
+from quad_nav.mission.goal_file import SequenceSettings
+from quad_nav.mission.place_check import PlaceCheck, clearance_check
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.scenario.coverage import (
     BYTES_PER_CELL,

@@ -13,7 +13,8 @@ from quad_nav.config import Configuration
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.goal_file import GoalSequence, PlaceCheck, readable_goals
+from quad_nav.mission.goal_file import GoalSequence, readable_goals
+from quad_nav.mission.place_check import PlaceCheck
 from quad_nav.mission.robot_goals import GoalSource, goal_paths
 from quad_nav.scenario.flight_setup import (
     FlightOptions,

@@ -154,8 +154,7 @@ def _read_scene(
     obstacles = [_read_obstacle(check, entry, k) for k, entry in entries]
     moving = [one for one in obstacles if isinstance(one, MovingObstacle)]
     standing = [one for one in obstacles if one and not isinstance(one, MovingObstacle)]
-    starts = _read_starts(check, fields, imported)
-    content = imported or NOTHING
+    starts, content = _read_starts(check, fields, imported), imported or NOTHING
     scene = Scene(
         check.text(fields, "name", "", default_name),
         size[0],

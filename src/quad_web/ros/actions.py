@@ -16,7 +16,7 @@ from std_srvs.srv import Empty, SetBool, SetBoolRequest, Trigger
 
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.goal import goal_faults
-from quad_nav.mission.goal_file import PlaceCheck
+from quad_nav.mission.place_check import PlaceCheck
 from quad_nav.mission.robot_goals import goal_paths
 from quad_nav.ros.common.nav_messages import planar_pose, pose_stamped
 from quad_nav.ros.sequencer.mission_stop import RESUME_SERVICE, STOP_SERVICE, STOPPED_PARAMETER

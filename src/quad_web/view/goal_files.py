@@ -14,7 +14,8 @@ from quad_nav.errors import InputError
 from quad_nav.files.output import reason, write_bytes
 from quad_nav.files.user_files import read_bytes
 from quad_nav.mission.goal import goal_faults
-from quad_nav.mission.goal_file import MAX_BYTES, PlaceCheck, parse_goals
+from quad_nav.mission.goal_file import MAX_BYTES, parse_goals
+from quad_nav.mission.place_check import PlaceCheck
 from quad_web.view.actions import Actions, Answer, GoalChange, GoalFileView
 from quad_web.view.goal_edit import edited_text
 

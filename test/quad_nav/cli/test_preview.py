@@ -188,7 +188,7 @@ def test_command_writes_the_picture_and_returns_the_status_of_fly(hall, tmp_path
 def test_command_refuses_other_names(tmp_path):
     result = CliRunner().invoke(command, ["-o", str(tmp_path / "out.jpg")])
     assert result.exit_code == 2
-    assert "expected a name in .png, .svg, .html" in result.output
+    assert "expected a name that ends in .png or .svg or .html" in result.output
 
 
 def test_moving_obstacles_are_drawn_where_they_start_with_their_paths(hall):

@@ -13,11 +13,11 @@ from quad_nav.mission.goal_file import (
     SETTINGS,
     GoalSequence,
     SequenceSettings,
-    clearance_check,
     load_goals,
     parse_goals,
     read_settings,
 )
+from quad_nav.mission.place_check import clearance_check
 from quad_nav.mission.robot_goals import WatchedGoalFile
 
 GOALS = Path(__file__).parents[3] / "goals"

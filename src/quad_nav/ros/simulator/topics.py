@@ -75,8 +75,7 @@ class SimulatorTopics:
                 navigators share the process, their scans come from there.
         """
         self._simulation = simulation
-        robots = range(simulation.n_robots)
-        self.lidar_enabled = [True for _ in robots]
+        self.lidar_enabled = [True] * simulation.n_robots
         self._lagging_reports = 0
         self._poses = PoseTopics(simulation, localizes)
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10, latch=True)
@@ -97,11 +96,13 @@ class SimulatorTopics:
         self._quadcopters.publish(
             marker_array(quadcopter_markers(count) + number_markers(count, simulation.scene))
         )
-
         if map_resolution_m > 0.0:
-            self._map = rospy.Publisher("/map", OccupancyGrid, queue_size=1, latch=True)
-            scene = scene_map(simulation.scene, map_resolution_m)
-            self._map.publish(map_message(scene, time_message(simulation.now_s)))
+            self._publish_map(map_resolution_m)
+
+    def _publish_map(self, resolution_m: float) -> None:
+        self._map = rospy.Publisher("/map", OccupancyGrid, queue_size=1, latch=True)
+        scene = scene_map(self._simulation.scene, resolution_m)
+        self._map.publish(map_message(scene, time_message(self._simulation.now_s)))
 
     def _publish_flight_info(self) -> None:
         simulation = self._simulation
