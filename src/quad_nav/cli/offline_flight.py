@@ -71,7 +71,7 @@ def fly_mission(
     **given: Any,
 ) -> None:
     """Fly with the options of ``quad fly`` and exit with its status."""
-    served = {name: given.pop(name) for name in _PAGE_OPTIONS}
+    served, localization = {k: given.pop(k) for k in _PAGE_OPTIONS}, given.pop("localization")
     with exit_on_faults():
         outputs = Outputs(
             {"--json": json_path, "--report": report},
@@ -80,7 +80,6 @@ def fly_mission(
             quiet=quiet,
             suffixes={"--report": HTML},
         )
-        localization = given.pop("localization")
         options = replace(_options(**given), localization=_localization(localization))
         with clock("reading the mission", quiet):
             setup = read_setup(options)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
-from typing import Container, Optional, Sequence, Tuple
+from typing import Container, List, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
