@@ -91,9 +91,7 @@ def find_conflict(
         The peer and how to yield to it, None to go on.
     """
     before = _before(priority, peers)
-    if not before:
-        return None
-    own = predict_positions(position, path, cruise_mps, _TIMES_S)
+    own = predict_positions(position, path, cruise_mps, _TIMES_S) if before else path
     for peer in before:
         stands = peer.name in stationary
         if stands and _distance_m(peer, position) > _BLOCKING_FACTOR * min_separation_m:
