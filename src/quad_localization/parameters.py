@@ -126,11 +126,7 @@ class AmclParams:
         "peer_radius", 0.5, "m", "Beams that end so near a peer are left out; 0: none.", own=True
     )
     lost_above_m: float = fixed_number(
-        "lost_above",
-        0.5,
-        "m",
-        "Deviation of the heaviest cluster above which no transform is sent.",
-        own=True,
+        "lost_above", 0.5, "m", "Deviation above which no transform is sent.", own=True
     )
     upstream: bool = fixed_flag("upstream", False, "Behave as C++ amcl, bugs included.", own=True)
 

@@ -45,7 +45,7 @@ ROWS = {
     ],
     "numbers in a scene": [document.MAX_MAGNITUDE, scene_file.MAX_SIZE_M, document.MAX_TEXT_LENGTH],
     "starts in a scene": [scene_file.MAX_STARTS],
-    "starts chosen by `quad`": [imported_scene.MAX_CANDIDATES],
+    "starts chosen by `quad`": [imported_scene.MAX_START_CELLS],
     "Gazebo world": [
         xml_tree.MAX_BYTES,
         xml_tree.MAX_ELEMENTS,

@@ -45,13 +45,7 @@ class ProgressParams:
         "progress_timeout", 10.0, "seconds", 0, 100, "Time stuck until a new plan.", upstream=0.0
     )
     distance_m: float = number(
-        "progress_distance",
-        0.1,
-        "metres",
-        0,
-        10,
-        "Motion and way along the plan that are progress.",
-        own=True,
+        "progress_distance", 0.1, "metres", 0, 10, "Motion and way that are progress.", own=True
     )
     stuck_cost_factor: float = number(
         "stuck_cost_factor", 0.1, "", 0, 1, "Factor of occdist_scale if stuck.", upstream=1.0

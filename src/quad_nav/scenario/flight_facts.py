@@ -44,6 +44,7 @@ def offline_facts(
         "airframe": airframe_name(simulation.airframe),
         "jitter_m": simulation.jitter_m,
         "odom_drift": asdict(simulation.odom_drift),
+        "localization": None,
         "lidar": {
             "beams": simulation.lidar.beam_count,
             "scan_range_rad": simulation.lidar.scan_range_rad,

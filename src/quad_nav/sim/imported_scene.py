@@ -35,7 +35,7 @@ NARROW_DISTANCE_M = BODY_RADIUS_M + 0.1
 """That of a start where no place is wider."""
 _HULL_M = BODY_RADIUS_M + 0.05
 """Half of the narrowest passage between two parts: the robot_radius of ``config/default``."""
-_CELL_M, _MAX_CELLS = 0.1, 5e5
+_CELL_M, MAX_START_CELLS = 0.1, 500_000
 """Side of a cell in which passages are searched, larger in arenas of more cells than this."""
 _MAX_LATTICE_POINTS = 20_000
 
@@ -148,7 +148,7 @@ class _Ground:
         from quad_nav.sim.scene_cells import parts_of, touched_cells  # here: it loads numba
 
         self._scene, self._distance_m = scene, distance_m
-        cell_m = max(_CELL_M, math.sqrt(scene.size_x_m * scene.size_y_m / _MAX_CELLS))
+        cell_m = max(_CELL_M, math.sqrt(scene.size_x_m * scene.size_y_m / MAX_START_CELLS))
         columns, rows = (math.ceil(one / cell_m) for one in (scene.size_x_m, scene.size_y_m))
         self._spec = GridSpec(columns, rows, cell_m, scene.origin_x_m, scene.origin_y_m)
         self._parts = parts_of(~touched_cells(scene, self._spec, _HULL_M))

@@ -130,7 +130,7 @@ def test_parameters_without_effect_are_refused(parameter, fault):
 def assert_refused(command, parameter, fault):
     done = CliRunner().invoke(main, [*command.split(), "--set", parameter, "-q"])
     assert done.exit_code == 2, done.output
-    assert fault in done.output and "flight not started" in done.output
+    assert fault in done.output and " not started, invalid input:" in done.output
 
 
 @pytest.mark.parametrize(
