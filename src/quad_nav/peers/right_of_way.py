@@ -95,7 +95,7 @@ def find_conflict(
     for peer in before:
         stands = peer.name in stationary
         if stands and _distance_m(peer, position) > _BLOCKING_FACTOR * min_separation_m:
-            if not len(path) and _ends_at(peer, position, min_separation_m):
+            if not len(path) and ends_at(peer, position, min_separation_m):
                 return peer, Yield.MAKE_ROOM
             continue
         theirs = predict_peer(peer, cruise_mps)
@@ -116,7 +116,7 @@ def _distance_m(peer: Peer, position: NDArray[np.float64]) -> float:
     return float(np.hypot(*(peer.position - position)))
 
 
-def _ends_at(peer: Peer, position: NDArray[np.float64], min_separation_m: float) -> bool:
+def ends_at(peer: Peer, position: NDArray[np.float64], min_separation_m: float) -> bool:
     """Return whether the path of a peer ends nearer to a position, float64[2], than it may."""
     path = peer.intention.path
     return bool(len(path)) and bool(np.hypot(*(path[-1] - position)) < min_separation_m)

@@ -17,6 +17,7 @@ from quad_nav.peers.right_of_way import (
     Yield,
     YieldDecision,
     approaches,
+    ends_at,
     find_conflict,
     meets,
     predict_peer,
@@ -134,7 +135,12 @@ class YieldRules:
             return None
         ahead = _path_ahead(peer)
         separation_m = self._tracker.min_separation_m + TOLERANCE_M
-        if not meets(pose, goal_path, peer, separation_m, self._tracker.cruise_mps):
+        waits_for_place = peer.name in self._tracker.stationary and ends_at(
+            peer, goal_path[-1], separation_m
+        )
+        if not waits_for_place and not meets(
+            pose, goal_path, peer, separation_m, self._tracker.cruise_mps
+        ):
             return None
         nearest_m = float(np.hypot(*(ahead - (pose.x_m, pose.y_m)).T).min())
         if nearest_m > separation_m or not approaches(

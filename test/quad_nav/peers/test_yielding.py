@@ -203,6 +203,23 @@ def test_an_idle_robot_makes_room_for_a_peer_that_it_blocks():
     assert fleet.nearest_m > 2 * RADIUS_M
 
 
+@pytest.mark.parametrize("end_m, yields", [(5.2, True), (8.0, False)])
+def test_an_idle_robot_makes_room_for_a_peer_that_stands_far_away_and_wants_its_place(
+    end_m, yields
+):
+    """Plans of the peer lead around the idle robot, but to no goal that this one stands on."""
+    navigator = build_navigator(load({**TREE, "robot": 0}))
+    here, path = Pose2D(5.0, 5.0), np.array([[1.0, 5.0], [end_m, 5.0]])
+    idle = []
+    for now_s in np.arange(0.0, 12.0, 0.1).tolist():
+        peer = peer_at("quad1", Pose2D(1.0, 5.0), Twist2D(), now_s, Intention(-1.0, path))
+        idle.append(
+            navigator.tick(now_s, RobotPoses(here, here), Twist2D(), [peer]).state is State.IDLE
+        )
+    assert idle[70] and idle[-1] is not yields
+    assert np.count_nonzero(np.diff(idle)) == int(yields), "it decides once"
+
+
 def test_without_avoid_peers_they_do_not_avoid_each_other():
     fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(8.0, 5.0, math.pi), peers={"avoid_peers": False})
     fleet.navigators[0].set_goal(Pose2D(8.0, 5.0), 0.0)
