@@ -279,7 +279,10 @@ class Amcl:
             return None
         pose = Pose2D(*statistics.means[statistics.best].tolist())
         self.estimate = PoseEstimate(pose, statistics.covariance)
-        self.map_from_odom = pose.to_3d().compose(seen.odom_from_base.inverse())
+        odom_from_base = seen.odom_from_base
+        if not self.params.upstream:  # which puts a quadcopter, and its LIDAR, on the floor
+            odom_from_base = odom_from_base.to_2d().to_3d()
+        self.map_from_odom = pose.to_3d().compose(odom_from_base.inverse())
         return self.estimate
 
 

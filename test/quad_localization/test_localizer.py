@@ -11,7 +11,7 @@ import pytest
 from quad_localization import Amcl, AmclParams, Observation, OccupancyMap, PoseEstimate
 from quad_localization.occupancy_map import ray_range
 from quad_localization.parameters import BEAM, LASER_MODELS, LIKELIHOOD_FIELD_PROB
-from quad_nav.geometry import Pose2D, Pose3D, Scan
+from quad_nav.geometry import Pose2D, Pose3D, Scan, quaternion_from_euler
 
 BEAMS = 72
 STEP_RAD = 2 * math.pi / BEAMS
@@ -187,3 +187,15 @@ def test_beams_that_end_on_a_known_peer_are_left_out():
         amcl.update(seen(START, scan=scan_from(START, hidden), peers=peers))
         weights.append(amcl.particles.w_fast)
     assert weights[0] > 1.05 * weights[1]
+
+
+def test_the_transform_of_a_flying_robot_keeps_its_height_and_tilt():
+    amcl = Amcl(AmclParams(), seed=1)
+    amcl.set_map(ROOM, PoseEstimate(Pose2D(1.0, 1.0), 1e-6 * np.eye(3)))
+    tilted = Pose3D(0.5, 0.2, 1.2, quaternion_from_euler(0.1, 0.05, 0.3))
+    scan = Scan(0.0, -math.pi, math.pi / 8, 0.02, 60.0, np.full(16, 1.0, np.float32))
+    update = amcl.update(Observation("lidar", scan, Pose3D(0.0, 0.0, 0.06), tilted))
+    found = update.map_from_odom.compose(tilted)
+    assert found.z_m == pytest.approx(1.2)
+    assert found.rotation[2] == pytest.approx(tilted.rotation[2])
+    assert (found.x_m, found.y_m) == pytest.approx((1.0, 1.0), abs=0.01)
