@@ -64,6 +64,8 @@ def _motion_cautions(
         return
     speed_mps, turn_radps, sideways = speeds
     period_s = 1.0 / max(navigator.controller_frequency_hz, 1e-9)
+    if isinstance(local_planner, DwaParams):
+        yield from _start_caution(local_planner, period_s)
     if speed_mps * period_s > sees_m / 2:
         text = f"a command is flown for {period_s:g} s, which is {speed_mps * period_s:.1f} m"
         yield "controller_frequency", f"{text}; the local costmap reaches {sees_m:g} m"
@@ -73,6 +75,18 @@ def _motion_cautions(
             f"at {speed_mps:g} m/s and {turn_radps:g} rad/s the robot turns with a radius of "
             f"{speed_mps / turn_radps if turn_radps else math.inf:.1f} m; the local costmap "
             f"reaches {sees_m:g} m",
+        )
+
+
+def _start_caution(dwa: DwaParams, period_s: float) -> Iterator[Caution]:
+    """Yield why a robot at rest finds no velocity among those that one period reaches."""
+    reached = dwa.acc_lim_x_mps2 * period_s, dwa.acc_lim_theta_radps2 * period_s
+    least = dwa.min_vel_trans_mps, dwa.min_vel_theta_radps
+    if dwa.use_dwa and reached[0] < least[0] and reached[1] < least[1]:
+        yield (
+            "acc_lim_x",
+            f"in a control period, {period_s:g} s, the robot reaches {reached[0]:g} m/s and "
+            f"{reached[1]:g} rad/s, less than min_vel_trans and min_vel_theta: it never starts",
         )
 
 

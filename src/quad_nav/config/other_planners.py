@@ -23,7 +23,8 @@ _NAMES = {
 
 def dwa_limits(others: Mapping[str, Any]) -> Dict[str, Any]:
     """Return the parameters of DWAPlannerROS that follow from another planner's namespace."""
-    limits: Dict[str, Any] = {}
+    # DWAPlannerROS's own least speeds may be more than these accelerations reach in a period.
+    limits: Dict[str, Any] = {"min_vel_trans": 0.0, "min_vel_theta": 0.0}
     for name, candidates in _NAMES.items():
         given = [others[one] for one in candidates if _is_number(others.get(one))]
         if given:

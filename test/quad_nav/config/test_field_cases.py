@@ -180,6 +180,11 @@ def test_what_may_let_a_robot_touch_something_is_told(case, caution):
             "TrajectoryPlannerROS: {max_vel_x: 1.0, max_vel_theta: 0.1, holonomic_robot: false}",
             "turns with a radius of 10.0 m",
         ),
+        (
+            "{base_local_planner: dwa_local_planner/DWAPlannerROS, controller_frequency: 20.0,"
+            " DWAPlannerROS: {acc_lim_x: 0.5, acc_lim_theta: 0.5}}",
+            "reaches 0.025 m/s and 0.025 rad/s, less than min_vel_trans",
+        ),
         ("base_global_planner: carrot_planner/CarrotPlanner", "CarrotPlanner flies straight on"),
     ],
 )
