@@ -256,7 +256,7 @@ def test_an_incomplete_bag_is_refused_with_its_remedy(tmp_path):
     file = create(tmp_path / "flight.bag")
     topic = file.add_topic("/odom0", "nav_msgs/Odometry", False, "/test")
     file.write(topic, 10**9, messages.encode(odometry(10**9, 0.0)))
-    file._writer.bio.flush()
+    file._writer.bio.close()  # as a program that is killed
     with pytest.raises(InputError, match="no index.*rosbag reindex"):
         read_trace(tmp_path / "flight.bag.active")
 
