@@ -23,8 +23,10 @@ _NAMES = {
 
 def dwa_limits(others: Mapping[str, Any]) -> Dict[str, Any]:
     """Return the parameters of DWAPlannerROS that follow from another planner's namespace."""
-    # DWAPlannerROS's own least speeds may be more than these accelerations reach in a period.
-    limits: Dict[str, Any] = {"min_vel_trans": 0.0, "min_vel_theta": 0.0}
+    # The accelerations of such planners are often so low that what one control period reaches is
+    # less than DWAPlannerROS's least speeds, or than what its costs can tell apart: the robot would
+    # not start. Without use_dwa the samples are what the whole rollout reaches.
+    limits: Dict[str, Any] = {"min_vel_trans": 0.0, "min_vel_theta": 0.0, "use_dwa": False}
     for name, candidates in _NAMES.items():
         given = [others[one] for one in candidates if _is_number(others.get(one))]
         if given:
