@@ -44,7 +44,7 @@ def model_folders(world: Path) -> List[Path]:
 
 
 def _package_of(path: Path) -> Optional[Path]:
-    above = path.resolve().parents[:_LEVELS]
+    above = list(path.resolve().parents)[:_LEVELS]
     return next((one for one in above if (one / "package.xml").exists()), None)
 
 
