@@ -55,9 +55,10 @@ def _escaped_messages() -> Iterator[None]:
     try:
         yield
     except click.ClickException as error:
-        error.message = printable(error.message)  # type: ignore[misc]
+        shown: Any = error  # not every version of click lets its messages be set
+        shown.message = printable(error.message)
         if isinstance(error, click.FileError):
-            error.ui_filename = printable(error.ui_filename)  # type: ignore[misc]
+            shown.ui_filename = printable(error.ui_filename)
         raise
 
 
