@@ -16,7 +16,8 @@ from quad_nav.files.kernel_cache import njit
 HIT, MISS = np.float32(math.log(0.9 / 0.1)), np.float32(math.log(0.4 / 0.6))
 """Log-odds of a beam's end and of a cell that it passes: the values of Hector SLAM."""
 MAX_LOG_ODDS = np.float32(5.0)
-"""What was seen for long is forgotten as fast as anything else: people walk on."""
+"""Limit, so that a cell that was seen many times still changes within some scans, as when a person
+walks on."""
 
 
 class MapView(NamedTuple):

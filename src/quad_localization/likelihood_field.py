@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 
 class LikelihoodField(NamedTuple):
-    """What the likelihood field models look up, cell by cell; the last value is for outside.
+    """Values of the likelihood field models for each cell; the last value is for outside.
 
     Attributes:
         distances_m: float64[cells + 1], distance to the nearest obstacle; infinite outside.

@@ -56,7 +56,7 @@ class Observation:
 
 @dataclass(frozen=True)
 class Update:
-    """What a scan did.
+    """Result of a scan.
 
     Attributes:
         is_moved: Whether the particles moved with the odometry.

@@ -19,6 +19,8 @@ from quad_nav.scenario.scene_map import scene_map
 from quad_nav.sim.map_file import load_map
 from quad_nav.sim.scene_file import load_scene
 
+CELL_M = 0.05
+"""Size of the cells of maps that are drawn, or made by slam."""
 OCCUPIED_FROM, FREE_UP_TO = 65, 25
 """Occupancies, in percent, from which on and up to which a cell is saved as known."""
 _OCCUPIED_PIXEL, _FREE_PIXEL, _UNKNOWN_PIXEL = 0, 254, 205

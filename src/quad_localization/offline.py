@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_localization.localizer import Amcl, Observation, PoseEstimate
+from quad_localization.map_files import CELL_M
 from quad_localization.occupancy_map import OccupancyMap
 from quad_localization.parameters import read_params
 from quad_localization.slam import Slam
@@ -20,8 +21,6 @@ from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.scenario.scene_map import scene_map
 from quad_nav.sim.localization import believed_states
 from quad_nav.sim.scene import Scene
-
-MAP_RESOLUTION_M = 0.05
 
 
 class SlamLocalization:
@@ -60,7 +59,7 @@ class AmclLocalization:
         params, faults = read_params(read_yaml(path))
         if faults:
             raise InputError([f"{path}: {fault}" for fault in faults])
-        drawn = scene_map(scene, MAP_RESOLUTION_M)
+        drawn = scene_map(scene, CELL_M)
         spec = drawn.spec
         grid = OccupancyMap.from_occupancy(
             drawn.occupancy, spec.resolution_m, spec.origin_x_m, spec.origin_y_m

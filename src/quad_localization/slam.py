@@ -20,12 +20,15 @@ from numpy.typing import NDArray
 
 from quad_localization.growing_map import GrowingMap
 from quad_localization.growing_map_kernel import fit, normal_equations, search
+from quad_localization.map_files import CELL_M
 from quad_nav.costmap.projection import scan_points
 from quad_nav.geometry import Pose2D, Pose3D, Scan, angle_difference
 
 Floats = NDArray[np.float64]
 
 _ITERATIONS = 4
+_LARGEST_STEP = 0.2
+"""In m and rad. Far from the fit the equations, which are linear, lead too far."""
 _BEAMS = 180
 """Points of a scan that are fitted; more cost time and tell nothing new."""
 _GAP_M = 0.3
@@ -51,10 +54,11 @@ class SlamParams:
             and its beams may hit the floor.
         insert_m: Way after which a scan is inserted.
         insert_rad: Turn after which a scan is inserted.
-        lost_below: Mean occupancy at the ends of beams below which the robot is lost.
+        lost_below: Mean occupancy at the ends of beams below which the robot is lost. Where a scan
+            fits, it is 0.6 or more; in free space it is near 0.
     """
 
-    resolution_m: float = 0.05
+    resolution_m: float = CELL_M
     odom_per_m: float = 0.1
     odom_per_rad: float = 0.1
     start_m: float = 0.15
@@ -68,7 +72,7 @@ class SlamParams:
 
 @dataclass
 class SlamPose:
-    """What is known of a robot's place.
+    """Estimate of a robot's place.
 
     Attributes:
         map_from_odom: Where its odometry frame is.
@@ -180,7 +184,7 @@ class Slam:
                 hessian, gradient = normal_equations(view, found, points)
                 pull = information @ _difference(prior, found)
                 step = np.linalg.solve(hessian + information, gradient + pull)
-                found = found + np.clip(step, -0.2, 0.2)
+                found = found + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
         place.fit = fit(self.map.views[-1], found, points)[0]
         place.is_lost = place.fit < self._params.lost_below
         if place.is_lost:

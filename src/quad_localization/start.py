@@ -1,4 +1,4 @@
-"""Where amcl begins."""
+"""The initial pose of amcl."""
 
 from __future__ import annotations
 

@@ -212,6 +212,17 @@ class Scan:
     ranges_m: NDArray[np.float32]
 
 
+def covariance_36(planar: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a covariance float64[3, 3] of x, y and yaw as messages have it; the rest is exact.
+
+    Returns:
+        float64[36], the rows of x, y, z, roll, pitch and yaw.
+    """
+    covariance = np.zeros((6, 6))
+    covariance[np.ix_((0, 1, 5), (0, 1, 5))] = planar
+    return covariance.reshape(36)
+
+
 def normalize_angle(angle_rad: float) -> float:
     """Return the same angle in [-pi, pi]."""
     return math.atan2(math.sin(angle_rad), math.cos(angle_rad))

@@ -9,9 +9,16 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from quad_localization.offline import LocalizationErrors, SlamLocalization
+from quad_localization.offline import MAKERS, LocalizationErrors, SlamLocalization
 from quad_nav.cli.__main__ import main
+from quad_nav.cli.fly import LOCALIZATIONS
+from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, quaternion_from_yaw
+from quad_nav.loop import offline_setup
+from quad_nav.loop.flight_loop import FlightLoop
+from quad_nav.scenario.flight_setup import FlightOptions, read_setup
+from quad_nav.scenario.rules import LOCALIZATIONS as RULE_NAMES
+from quad_nav.scenario.rules import SIMULATOR
 from quad_nav.sim.flight import BodyState
 from quad_nav.sim.localization import believed_states
 from quad_nav.sim.odometry import OdomFrames
@@ -52,6 +59,11 @@ def test_the_tutorial_s_mission_without_a_map(tmp_path):
     assert summary["localization"]["yaw_error_rad"]["p95"] < 0.03
 
 
+def test_the_command_offers_what_is_here():
+    assert LOCALIZATIONS == (SIMULATOR, *MAKERS)
+    assert set(LOCALIZATIONS) < set(RULE_NAMES)
+
+
 def test_robots_that_have_not_seen_anything_are_lost():
     assert SlamLocalization(None, 2).is_lost(1)
     assert LocalizationErrors().figures()["position_error_m"] == {"median": 0.0, "p95": 0.0}
@@ -65,3 +77,18 @@ def test_amcl_on_the_map_of_the_scene(tmp_path):
     summary = json.loads(path.read_text())
     assert summary["contacts"] == []
     assert summary["localization"]["position_error_m"]["p95"] < 0.15
+
+
+def test_after_a_reset_the_map_is_made_anew():
+    """The robots are at their starts again, and their odometry begins anew."""
+    setup = read_setup(
+        FlightOptions(None, shipped("goals"), localization=SlamLocalization, robots=2)
+    )
+    loop = FlightLoop(offline_setup(setup), [(0, 1)])
+    loop.start()
+    before = loop.group.localization
+    assert not before.is_lost(1)
+    loop.reset()
+    assert loop.group.localization is not before
+    assert loop.group.localization.is_lost(1), "no scan yet"
+    loop.close()

@@ -21,14 +21,13 @@ from nav_msgs.srv import (
     LoadMapResponse,
 )
 
-from quad_localization.map_files import read_map
+from quad_localization.map_files import CELL_M, read_map
 from quad_localization.ros.map_messages import grid_message
 from quad_nav.errors import InputError
 from quad_nav.files.values import is_number
 from quad_nav.ros.common.readiness import init_node
 
 EXIT_BAD_INPUT = 2
-DEFAULT_RESOLUTION_M = 0.05
 _USAGE = "expected map_server FILE [RESOLUTION]: a map's YAML file, a scene or a Gazebo world"
 
 
@@ -91,7 +90,7 @@ def main() -> int:
 
 
 def _arguments(given: List[str]) -> Tuple[Path, float]:
-    resolution = given[1] if len(given) == 2 else str(DEFAULT_RESOLUTION_M)
+    resolution = given[1] if len(given) == 2 else str(CELL_M)
     try:
         resolution_m = float(resolution)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Where peers are, so that amcl leaves out the beams that end on them."""
+"""Positions of peers: amcl leaves out the beams that end on them."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from quad_localization.warm_up import warm_up_slam
 from quad_nav.errors import excerpt
 from quad_nav.files.kernel_cache import COMPILING, announced
 from quad_nav.files.values import is_number, is_whole
-from quad_nav.geometry import Pose2D
+from quad_nav.geometry import Pose2D, covariance_36
 from quad_nav.ros.common.conversions import (
     ScanMessage,
     pose_from_message,
@@ -163,9 +163,8 @@ class SlamNode:
         self._tf.publish(TFMessage([frame]))
         if place.odom_from_base is not None:
             here = place.map_from_odom.compose(place.odom_from_base).to_3d()
-            covariance = np.zeros((6, 6))
-            covariance[np.ix_((0, 1, 5), (0, 1, 5))] = place.covariance
-            pose = PoseWithCovariance(pose_message(here), covariance.ravel().tolist())
+            covariance = covariance_36(place.covariance).tolist()
+            pose = PoseWithCovariance(pose_message(here), covariance)
             robot.publisher.publish(PoseWithCovarianceStamped(Header(0, stamp, "map"), pose))
 
     def _set_pose(self, robot: SlamRobot) -> None:

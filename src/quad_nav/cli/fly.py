@@ -24,6 +24,7 @@ from quad_nav.cli.options import (
 # Those of quad_nav.sim.simulation and .flight; importing them would load the engine.
 LIDAR_CASTERS = ("kernel", "bullet")
 AIRFRAMES = ("default", "arducopter")
+LOCALIZATIONS = ("simulator", "amcl", "slam")
 
 
 @click.command(
@@ -116,8 +117,8 @@ AIRFRAMES = ("default", "arducopter")
 )
 @click.option(
     "--localization",
-    type=click.Choice(("simulator", "amcl", "slam")),
-    default="simulator",
+    type=click.Choice(LOCALIZATIONS),
+    default=LOCALIZATIONS[0],
     show_default=True,
     help="How robots know their places: exactly; by LIDAR and the scene's map (amcl); or by LIDAR"
     " alone (slam).",

@@ -30,7 +30,7 @@ from quad_nav.offline.run import fly as fly_setup
 from quad_nav.scenario.flight_facts import offline_facts
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.scenario.goal_plans import unreachable_goals
-from quad_nav.scenario.rules import RULES
+from quad_nav.scenario.rules import RULES, SIMULATOR
 from quad_nav.sim.flight import AIRFRAMES
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.localization import LocalizationMaker
@@ -181,7 +181,7 @@ def mission_options(parameters: Tuple[str, ...], **given: Any) -> FlightOptions:
 
 def _localization(name: str) -> Optional[LocalizationMaker]:
     """Return what finds the robots' places; None for the simulator, which knows them."""
-    if name == "simulator":
+    if name == SIMULATOR:
         return None
     maker: LocalizationMaker = _localizations().MAKERS[name]
     return maker
@@ -194,7 +194,7 @@ def _localizations() -> Any:
 def _observers(record: Optional[Path], localization: str) -> List[FlightObserver]:
     """Create the recorder, which loads slowly, and what measures the errors of a localization."""
     observers: List[FlightObserver] = []
-    if localization != "simulator":
+    if localization != SIMULATOR:
         observers.append(_localizations().LocalizationErrors())
     if record is not None:
         from quad_nav.recording.recorder import Recorder

@@ -30,7 +30,7 @@ from quad_nav.scenario.navigator_host import NavigatorHost
 from quad_nav.scenario.scene_map import SceneMaps
 from quad_nav.sim.casters import Lidars
 from quad_nav.sim.lidar import base_from_lidar
-from quad_nav.sim.localization import believed_states
+from quad_nav.sim.localization import Localization, believed_states
 from quad_nav.sim.odometry import FIXED_FRAMES, pose_in
 from quad_nav.sim.robot_state import RobotState, RobotStates
 from quad_nav.timing import is_due
@@ -200,10 +200,13 @@ class NavigatorGroup:
         self.intentions = [Intention(idle_priority(n)) for n in range(len(setup.names))]
         self.last_scans: Dict[int, LocatedScan] = {}
         self._wave = Wavefront()
-        make = setup.localization
-        self.localization = make(setup.scene, len(setup.names)) if make else None
+        self.localization = self._new_localization()
         self.robots = {number: self.new_robot(number) for number in robots}
         self.set_maps()
+
+    def _new_localization(self) -> Optional[Localization]:
+        setup = self.setup
+        return setup.localization and setup.localization(setup.scene, len(setup.names))
 
     def set_maps(self) -> None:
         """Give static layers the scene's map."""
@@ -327,7 +330,7 @@ class NavigatorGroup:
             jumped_back: The clock has jumped back, so that the navigators restart.
             lidars: LIDARs of all robots.
         """
-        self._lidars = lidars
+        self._lidars, self.localization = lidars, self._new_localization()
         for robot in self.robots.values():
             robot.reset(now_s, jumped_back)
 

@@ -10,7 +10,7 @@ import math
 from pathlib import Path
 from typing import Any, List
 
-from quad_nav.geometry import Pose3D, Scan
+from quad_nav.geometry import Pose3D, Scan, covariance_36
 from quad_nav.mission.actions import Action, SendGoal
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.offline.flight import Flight, FlightObserver
@@ -159,7 +159,7 @@ class Recorder(FlightObserver):
             state.angular_radps,
             (f"odom{robot}", f"base_link{robot}"),
             stamp,
-            *(() if errors is None else (errors.covariance_36(robot),)),
+            *(() if errors is None else (covariance_36(errors.covariances[robot]),)),
         )
         self._write(f"/odom{robot}", stamp, odometry, _SIMULATOR)
 

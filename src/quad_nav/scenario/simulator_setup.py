@@ -104,7 +104,7 @@ def read_setup(
         InputError: Every fault in the parameters and in the scene.
     """
     values = _checked_values(parameters, name)
-    scene = scene_of(values)
+    scene, localizes = scene_of(values), values["localization"] == SIMULATOR
     if values["config"]:
         area = area_of(values)
         fleet = read_configurations(values["config"], values["robots"], area, numbered=True)
@@ -122,9 +122,9 @@ def read_setup(
         values["gui"],
         values["start_paused"],
         steps_per_scan(values["lidar_rate"]),
-        float(values["map_resolution"]),
+        float(values["map_resolution"]) if localizes else 0.0,  # who localizes publishes the map
         hosted,
-        values["localization"] == SIMULATOR,
+        localizes,
         values["hosts"],
     )
 

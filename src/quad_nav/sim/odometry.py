@@ -137,12 +137,6 @@ class Odometry:
         self._true, self._now_s = poses.copy(), now_s
         self._place_frames()
 
-    def covariance_36(self, robot: int) -> NDArray[np.float64]:
-        """Return a robot's covariance as in ``nav_msgs/Odometry``; the other axes are exact."""
-        covariance = np.zeros((6, 6))
-        covariance[np.ix_((0, 1, 5), (0, 1, 5))] = self.covariances[robot]
-        return covariance.reshape(36)
-
     def _add(self, moves: NDArray[np.float64], deviations: NDArray[np.float64]) -> None:
         """Add motions in the bodies' frames; their covariances are propagated to first order."""
         yaws_rad = self._measured[:, 2]

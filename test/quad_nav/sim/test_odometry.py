@@ -12,7 +12,7 @@ from recorded_flight import flown, setup
 
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
-from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
+from quad_nav.geometry import Pose2D, Pose3D, covariance_36, quaternion_from_yaw
 from quad_nav.loop.navigator_group import LoopRobot
 from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly
@@ -85,7 +85,7 @@ def test_the_covariance_is_that_of_the_errors():
     odometry = measured(robots=4000, turn_rad=1.0, per_m=0.05, per_rad=0.05)
     found = rows(odometry, Pose2D(1.0, 0.0, 1.0))
     assert np.cov(found.T) == pytest.approx(odometry.covariances[0], abs=2e-4)
-    message = odometry.covariance_36(0).reshape(6, 6)
+    message = covariance_36(odometry.covariances[0]).reshape(6, 6)
     assert message[5, 5] == pytest.approx(0.05**2)
     assert message[1, 5] == odometry.covariances[0][1, 2] != 0.0
     assert not message[2:5].any()

@@ -10,7 +10,7 @@ from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
 from tf2_msgs.msg import TFMessage
 
-from quad_nav.geometry import Pose3D
+from quad_nav.geometry import Pose3D, covariance_36
 from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.packed_messages import (
     STATES_TOPIC,
@@ -86,7 +86,7 @@ class PoseTopics:
         for i in heard:
             pose = self._in_odom(i, poses[i])
             odometry = self._simulation.odometry
-            covariance = None if odometry is None else odometry.covariance_36(i)
+            covariance = None if odometry is None else covariance_36(odometry.covariances[i])
             message = self._odometry_writers[i].message(stamp, pose, twists[i], covariance)
             self._odometry[i].publish(message)
 
