@@ -25,11 +25,11 @@ Json = Dict[str, Any]
 INK, QUIET, GRID, ALARM = "#20262c", "#5a6570", "#e4e8ec", "#c01020"
 PAPER, EDGE, SOLID, OUTLINE = "#ffffff", "#a0a8b0", "#b9bfc6", "#7c858e"
 _DARK = {
-    INK: "#e3e7eb",
+    INK: "#e4e9ef",
     QUIET: "#a2adb8",
     GRID: "#2b323a",
     ALARM: "#ff6b6b",
-    PAPER: "#14181d",
+    PAPER: "#171b21",
     EDGE: "#5f6a75",
     SOLID: "#48525c",
 }
