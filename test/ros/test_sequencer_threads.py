@@ -30,7 +30,6 @@ from quad_nav.scenario.mission_setup import read_setup
 ROBOTS, LEGS = 3, 20
 PERIOD_S, SPEED_MPS, SPACING_M = 0.025, 3.0, 5.0
 LATE_S = 0.2  # delay of a result after the next goal
-DISK_S = 4.0
 PATIENCE_S = 40.0
 
 
@@ -83,6 +82,8 @@ class Stub:
 
 
 class SequencerThreads(unittest.TestCase):
+    is_over = False
+
     @classmethod
     def setUpClass(cls):
         rospy.init_node("test_sequencer_threads")
@@ -97,8 +98,14 @@ class SequencerThreads(unittest.TestCase):
         cls.events = []
         rospy.Subscriber("/quad/events", MissionEvent, lambda one: cls.events.append(event_of(one)))
         cls.stubs = [Stub(number) for number in range(ROBOTS)]
-        threading.Thread(target=cls.fly, daemon=True).start()
+        cls.flight = threading.Thread(target=cls.fly, daemon=True)
+        cls.flight.start()
         cls.runner = cls.mission(Path(tempfile.mkdtemp(prefix="quad_threads_")))
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.is_over = True
+        cls.flight.join()
 
     @classmethod
     def mission(cls, folder):
@@ -111,7 +118,7 @@ class SequencerThreads(unittest.TestCase):
 
     @classmethod
     def fly(cls):
-        while not rospy.is_shutdown():
+        while not cls.is_over:
             for stub in cls.stubs:
                 stub.step()
             time.sleep(PERIOD_S)
@@ -137,24 +144,24 @@ class SequencerThreads(unittest.TestCase):
         self.check(self.runner.summary())
 
     def slow_disk(self):
-        """Goals are sent while one access to the disk takes `DISK_S`."""
-        fsync, begun = os.fsync, []
+        """Goals are sent while one access to the disk does not return."""
+        fsync, begun, goes_on = os.fsync, threading.Event(), threading.Event()
 
         def slow(file):
-            if not begun:
-                begun.append(time.monotonic())
-                time.sleep(DISK_S)
+            begun.set()
+            goes_on.wait(2 * PATIENCE_S)
             fsync(file)
 
         journal.os.fsync = slow
-        self.advance_until(lambda: begun, "a journal that is written")
+        self.addCleanup(setattr, journal.os, "fsync", fsync)
+        self.addCleanup(goes_on.set)
+        self.advance_until(begun.is_set, "a journal that is written")
         before = [len(stub.sent) for stub in self.stubs]
         self.advance_until(
             lambda: all(len(stub.sent) > count for stub, count in zip(self.stubs, before)),
             "goals of all robots",
         )
-        self.assertLess(time.monotonic(), begun[0] + DISK_S, "the goals waited for the disk")
-        journal.os.fsync = fsync
+        goes_on.set()
 
     def failure(self):
         def tick(*_):
