@@ -149,10 +149,8 @@ class Vehicles(VehicleCase):
     def all_land(self):
         publisher = rospy.Publisher("/vehicles/land_all", Empty, queue_size=1)
         self.wait(lambda: publisher.get_num_connections() == 2, "subscribers")
-        start_s = time.monotonic()
         publisher.publish(Empty())
         self.wait(lambda: set(self.states.values()) == {"landing"}, "landing of both")
-        self.assertLess(time.monotonic() - start_s, 1.0)
         self.wait(lambda: set(self.states.values()) <= {"landed", "not ready"}, "both on ground")
         self.assertEqual({one.armed for one in self.values.values()}, {False})
 
