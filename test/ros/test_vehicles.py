@@ -5,7 +5,6 @@ import math
 import os
 import signal
 import socket
-import time
 from xmlrpc.client import ServerProxy
 
 import actionlib
