@@ -83,3 +83,8 @@ def test_a_library_that_cannot_be_loaded_is_one_line(content, tmp_path, monkeypa
     assert "LD_PRELOAD" not in os.environ
     (line,) = capfd.readouterr().err.splitlines()
     assert line.startswith(f"quad: {library}: cannot be loaded; ")
+
+
+def test_an_unknown_address_is_told_in_one_line():
+    with pytest.raises(SystemExit, match="quad: no.such.name.invalid: .*; expected a line for it"):
+        FLY["free_port"]("no.such.name.invalid")

@@ -75,8 +75,8 @@ def find_conflict(
 ) -> Optional[Tuple[Peer, Yield]]:
     """Find the peer of highest priority that the robot has to yield to.
 
-    A robot goes on if that takes it out of the peer's way in time. For a stationary peer it does
-    not wait, but makes room on its path; for a distant one, only where it is parked on the goal.
+    A robot goes on if that takes it out of the peer's way in time. It does not wait for a
+    stationary peer, but leaves its path; if the peer is far, only if parked on the peer's goal.
 
     Args:
         position: Position of the robot, float64[2], metres in ``map``.
