@@ -10,7 +10,7 @@ Source: D. Fox, "KLD-Sampling: Adaptive Particle Filters", NIPS 2001.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,10 @@ from quad_nav.files.kernel_cache import njit
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
+Cell = Tuple[int, int, int]
 
 _SIZE, _TURN = 0.5, 10 * math.pi / 180  # of a cell, metres and radians
 TURN_CELLS = 36  # of a full turn
-_NODES, _LEAVES = 0, 1
 _LEAF = -1
 
 
@@ -31,11 +31,10 @@ class Histogram(NamedTuple):
 
     Attributes:
         cells: int64[n, 3], of the leaves.
-        children: int64[n, 2], nodes below and not below the pivot; -1 for leaves.
+        children: int64[n], the node below the pivot, whose neighbour is not below; -1 for leaves.
         axes: int64[n], which coordinate of a cell is compared with the pivot.
         pivots: float64[n].
-        clusters: int64[n], clusters of the leaves.
-        counts: int64[2], number of nodes and of leaves.
+        node_count: int64[1].
         turn_cells: Cells of a full turn, 0 if the yaw does not wrap, as in upstream.
     """
 
@@ -43,86 +42,78 @@ class Histogram(NamedTuple):
     children: Whole
     axes: Whole
     pivots: Floats
-    clusters: Whole
-    counts: Whole
+    node_count: Whole
     turn_cells: int
 
 
 def new_histogram(most_particles: int, turn_cells: int) -> Histogram:
     """Return an empty histogram for a number of particles."""
     n = 2 * most_particles + 1
-    return Histogram(
-        np.empty((n, 3), np.int64),
-        np.empty((n, 2), np.int64),
-        np.empty(n, np.int64),
-        np.empty(n),
-        np.full(n, -1),
-        np.zeros(2, np.int64),
-        turn_cells,
-    )
+    cells, children, axes = np.empty((n, 3), np.int64), np.full(n, _LEAF), np.empty(n, np.int64)
+    return Histogram(cells, children, axes, np.empty(n), np.zeros(1, np.int64), turn_cells)
 
 
 @njit(cache=True, nogil=True)
-def _cell_of(tree: Histogram, pose: Floats, cell: Whole) -> None:
-    """Write the cell of a pose."""
-    cell[0] = math.floor(pose[0] / _SIZE)
-    cell[1] = math.floor(pose[1] / _SIZE)
-    cell[2] = math.floor(pose[2] / _TURN)
-    if tree.turn_cells > 0:
-        cell[2] %= tree.turn_cells
+def cell_count(tree: Histogram) -> int:
+    """Return the number of cells that hold a particle: every other node has two below it."""
+    return (tree.node_count[0] + 1) // 2
 
 
 @njit(cache=True, nogil=True)
-def _add_leaf(tree: Histogram, cell: Whole) -> int:
-    node = tree.counts[_NODES]
-    tree.cells[node] = cell
-    tree.children[node] = _LEAF
-    tree.counts[_NODES] += 1
-    tree.counts[_LEAVES] += 1
-    return node
+def _cell_of(tree: Histogram, pose: Floats) -> Cell:
+    x, y, turn = pose[0] / _SIZE, pose[1] / _SIZE, pose[2] / _TURN
+    return math.floor(x), math.floor(y), _wrapped(tree, math.floor(turn))
 
 
 @njit(cache=True, nogil=True)
-def _descend(tree: Histogram, cell: Whole) -> int:
+def _wrapped(tree: Histogram, turn: int) -> int:
+    return turn % tree.turn_cells if tree.turn_cells > 0 else turn
+
+
+@njit(cache=True, nogil=True)
+def _add_leaf(tree: Histogram, cell: Cell) -> None:
+    node = tree.node_count[0]
+    tree.cells[node, 0], tree.cells[node, 1], tree.cells[node, 2] = cell
+    tree.node_count[0] += 1
+
+
+@njit(cache=True, nogil=True)
+def _descend(tree: Histogram, cell: Cell) -> int:
     """Return the leaf in whose part of space a cell is."""
     node = 0
-    while tree.children[node, 0] != _LEAF:
-        is_right = not cell[tree.axes[node]] < tree.pivots[node]
-        node = tree.children[node, int(is_right)]
+    while tree.children[node] != _LEAF:
+        is_below = cell[tree.axes[node]] < tree.pivots[node]
+        node = tree.children[node] + (0 if is_below else 1)
     return node
 
 
 @njit(cache=True, nogil=True)
-def _is_same(tree: Histogram, node: int, cell: Whole) -> bool:
-    at = tree.cells[node]
-    return at[0] == cell[0] and at[1] == cell[1] and at[2] == cell[2]
+def _cell_at(tree: Histogram, node: int) -> Cell:
+    return tree.cells[node, 0], tree.cells[node, 1], tree.cells[node, 2]
 
 
 @njit(cache=True, nogil=True)
 def add_pose(tree: Histogram, pose: Floats) -> int:
     """Add a pose float64[3]; return the number of cells."""
-    cell = np.empty(3, np.int64)
-    _cell_of(tree, pose, cell)
-    if tree.counts[_NODES] == 0:
+    cell = _cell_of(tree, pose)
+    if tree.node_count[0] == 0:
         _add_leaf(tree, cell)
         return 1
     node = _descend(tree, cell)
-    if _is_same(tree, node, cell):
-        return tree.counts[_LEAVES]
-    old = tree.cells[node].copy()
+    old = _cell_at(tree, node)
+    if cell == old:
+        return cell_count(tree)
     axis, widest = 0, 0
     for k in range(3):
         apart = abs(cell[k] - old[k])
         if apart > widest:
             axis, widest = k, apart
-    pivot = (cell[axis] + old[axis]) / 2.0
-    tree.axes[node], tree.pivots[node] = axis, pivot
-    is_below = cell[axis] < pivot
-    left = _add_leaf(tree, cell if is_below else old)
-    right = _add_leaf(tree, old if is_below else cell)
-    tree.children[node, 0], tree.children[node, 1] = left, right
-    tree.counts[_LEAVES] -= 1
-    return tree.counts[_LEAVES]
+    tree.axes[node], tree.pivots[node] = axis, (cell[axis] + old[axis]) / 2.0
+    tree.children[node] = tree.node_count[0]
+    is_below = cell[axis] < tree.pivots[node]
+    _add_leaf(tree, cell if is_below else old)
+    _add_leaf(tree, old if is_below else cell)
+    return cell_count(tree)
 
 
 @njit(cache=True, nogil=True)
@@ -135,30 +126,24 @@ def add_poses(tree: Histogram, poses: Floats) -> None:
 @njit(cache=True, nogil=True)
 def particle_clusters(tree: Histogram, poses: Floats) -> Whole:
     """Return the clusters int64[m] of poses that were added; number them, the last leaf first."""
-    nodes, clusters = tree.counts[_NODES], 0
-    left, cell = np.empty(nodes, np.int64), np.empty(3, np.int64)
+    nodes, count = tree.node_count[0], 0
+    clusters, left = np.full(nodes, -1), np.empty(nodes, np.int64)
     for first in range(nodes - 1, -1, -1):
-        if tree.children[first, 0] != _LEAF or tree.clusters[first] >= 0:
+        if tree.children[first] != _LEAF or clusters[first] >= 0:
             continue
-        tree.clusters[first] = clusters
-        left[0], count = first, 1
-        while count > 0:
-            count -= 1
-            node = left[count]
+        clusters[first], left[0], waiting = count, first, 1
+        while waiting > 0:
+            waiting -= 1
+            x, y, turn = _cell_at(tree, left[waiting])
             for k in range(27):
-                cell[0] = tree.cells[node, 0] + k // 9 - 1
-                cell[1] = tree.cells[node, 1] + k % 9 // 3 - 1
-                cell[2] = tree.cells[node, 2] + k % 3 - 1
-                if tree.turn_cells > 0:
-                    cell[2] %= tree.turn_cells
+                turn_k = _wrapped(tree, turn + k % 3 - 1)
+                cell = (x + k // 9 - 1, y + k % 9 // 3 - 1, turn_k)
                 other = _descend(tree, cell)
-                if tree.clusters[other] < 0 and _is_same(tree, other, cell):
-                    tree.clusters[other] = clusters
-                    left[count] = other
-                    count += 1
-        clusters += 1
+                if clusters[other] < 0 and _cell_at(tree, other) == cell:
+                    clusters[other], left[waiting] = count, other
+                    waiting += 1
+        count += 1
     labels = np.empty(len(poses), np.int64)
     for m in range(len(poses)):
-        _cell_of(tree, poses[m], cell)
-        labels[m] = tree.clusters[_descend(tree, cell)]
+        labels[m] = clusters[_descend(tree, _cell_of(tree, poses[m]))]
     return labels
