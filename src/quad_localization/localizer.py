@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_localization.laser import Laser
-from quad_localization.likelihood_field import LikelihoodField, likelihood_field
-from quad_localization.occupancy_map import OccupancyMap
+from quad_localization.occupancy_map import OccupancyMap, obstacle_distances
 from quad_localization.odometry_models import angle_difference, moved
 from quad_localization.parameters import BEAM, AmclParams
 from quad_localization.particle_filter import ParticleFilter
@@ -97,7 +96,7 @@ class Amcl:
         self.update_count = 0
         self._random, self._spreads = seeded(seed), 0
         self._grid: Optional[OccupancyMap] = None
-        self._field: Optional[LikelihoodField] = None
+        self._distances_m: Optional[Floats] = None
         self._lasers: Dict[str, Laser] = {}
         self._given: Optional[PoseEstimate] = None  # before the map
         self._has_begun = False  # since the last initialisation
@@ -122,8 +121,7 @@ class Amcl:
 
         A further map leaves the particles where they are; upstream begins anew.
         """
-        self._grid = grid
-        self._make_sensors()
+        self._make_sensors(grid)
         if self.particles is not None and not self.params.upstream:
             self.particles.free_places = grid.free_places
             return
@@ -158,19 +156,19 @@ class Amcl:
         self.params = params
         if self._grid is None or self.particles is None:
             return
-        self._make_sensors()
+        self._make_sensors(self._grid)
         self.particles.params = params
         if params.upstream:
             self.particles = ParticleFilter(params, self._grid.free_places, self._random)
             last = self.estimate or PoseEstimate(Pose2D(0.0, 0.0), np.zeros((3, 3)))
             self._spread(PoseEstimate(last.pose, np.diag(np.diag(last.covariance))))
 
-    def _make_sensors(self) -> None:
-        """Make the likelihood field anew, and forget the lasers."""
-        params, self._lasers, self._field = self.params, {}, None
-        if params.laser_model_type != BEAM and self._grid is not None:
-            distance_m, sigma_m = params.laser_likelihood_max_dist_m, params.laser_sigma_hit_m
-            self._field = likelihood_field(self._grid, distance_m, params.laser_z_hit, sigma_m)
+    def _make_sensors(self, grid: OccupancyMap) -> None:
+        """Measure a map, and forget the lasers."""
+        self._grid, self._lasers, self._distances_m = grid, {}, None
+        if self.params.laser_model_type != BEAM:
+            largest_m = self.params.laser_likelihood_max_dist_m
+            self._distances_m = obstacle_distances(grid, largest_m)
 
     def _spread(self, about: PoseEstimate) -> None:
         assert self.particles is not None
@@ -191,7 +189,7 @@ class Amcl:
             return None
         if seen.laser not in self._lasers:  # whose mount stays that of its first scan
             mount = (float(seen.base_from_laser.x_m), float(seen.base_from_laser.y_m))
-            self._lasers[seen.laser] = Laser(self.params, self._grid, self._field, mount)
+            self._lasers[seen.laser] = Laser(self.params, self._grid, self._distances_m, mount)
         laser, at = self._lasers[seen.laser], seen.odom_from_base
         if beams is not None and not self.params.upstream:
             beams = levelled(beams, at.quaternion)
@@ -229,20 +227,11 @@ class Amcl:
 
     def _move(self, odometry: Pose2D) -> None:
         assert self.particles is not None
-        one, before = self.params, self._odometry
+        before, poses = self._odometry, self.particles.poses
         turn_rad = float(angle_difference(odometry.yaw_rad, before.yaw_rad))
         delta = (odometry.x_m - before.x_m, odometry.y_m - before.y_m, turn_rad)
-        alphas = (
-            one.odom_alpha1,
-            one.odom_alpha2,
-            one.odom_alpha3,
-            one.odom_alpha4,
-            one.odom_alpha5,
-        )
         old_yaw_rad = odometry.yaw_rad - turn_rad
-        self.particles.poses = moved(
-            one.odom_model_type, alphas, self.particles.poses, old_yaw_rad, delta, self._random
-        )
+        self.particles.poses = moved(self.params, poses, old_yaw_rad, delta, self._random)
 
     def _leave_out_peers(self, beams: Beams, seen: Observation) -> None:
         """Take the ranges of beams that end on peers out; the latest transform says where."""
