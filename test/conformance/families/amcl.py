@@ -9,8 +9,8 @@ import numpy as np
 
 from families.case import Arrays, Case, Recorded, load_case
 from families.comparison import Comparison, Difference
+from quad_localization.clusters import add_poses, cell_count
 from quad_localization.covariance_axes import covariance_axes
-from quad_localization.histogram import add_poses, cell_count
 from quad_localization.laser import Laser
 from quad_localization.occupancy_map import (
     OccupancyMap,

@@ -1,4 +1,4 @@
-"""Histogram of particles: a tree of the cells that hold any, and the clusters of these.
+"""Clusters of particles, and the histogram that they come from: a tree of the cells in use.
 
 A cell is 0.5 m by 0.5 m by 10 degrees. The number of cells decides how many particles are drawn.
 Cells that touch each other, with their corners too, are a cluster. The tree's shape follows from
@@ -10,6 +10,7 @@ Source: D. Fox, "KLD-Sampling: Adaptive Particle Filters", NIPS 2001.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple, Tuple
 
 import numpy as np
@@ -24,6 +25,33 @@ Cell = Tuple[int, int, int]
 _SIZE, _TURN = 0.5, 10 * math.pi / 180  # of a cell, metres and radians
 TURN_CELLS = 36  # of a full turn
 _LEAF = -1
+
+
+@dataclass(frozen=True)
+class ClusterStatistics:
+    """Statistics of particles, poses in metres and radians; the yaw's are those of directions.
+
+    Attributes:
+        labels: int64[n], cluster of each particle.
+        weights: float64[c] of each cluster.
+        means: float64[c, 3].
+        covariances: float64[c, 3, 3], without terms between yaw and the place.
+        mean: float64[3] of all particles.
+        covariance: float64[3, 3] of all particles.
+    """
+
+    labels: Whole
+    weights: Floats
+    means: Floats
+    covariances: Floats
+    mean: Floats
+    covariance: Floats
+
+    @property
+    def best(self) -> int:
+        """The heaviest cluster, -1 if none has a weight."""
+        best = int(np.argmax(np.nan_to_num(self.weights, nan=-1.0)))
+        return best if self.weights[best] > 0.0 else -1
 
 
 class Histogram(NamedTuple):
@@ -124,7 +152,7 @@ def add_poses(tree: Histogram, poses: Floats) -> None:
 
 
 @njit(cache=True, nogil=True)
-def particle_clusters(tree: Histogram, poses: Floats) -> Whole:
+def _particle_clusters(tree: Histogram, poses: Floats) -> Whole:
     """Return the clusters int64[m] of poses that were added; number them, the last leaf first."""
     nodes, count = tree.node_count[0], 0
     clusters, left = np.full(nodes, -1), np.empty(nodes, np.int64)
@@ -147,3 +175,31 @@ def particle_clusters(tree: Histogram, poses: Floats) -> Whole:
     for m in range(len(poses)):
         labels[m] = clusters[_descend(tree, _cell_of(tree, poses[m]))]
     return labels
+
+
+def cluster_statistics(tree: Histogram, poses: Floats, weights: Floats) -> ClusterStatistics:
+    """Compute the statistics of poses float64[n, 3] that were added to a histogram."""
+    labels = _particle_clusters(tree, poses)
+    each, means, covariances = _moments(labels, poses, weights)
+    total, mean, covariance = _moments(np.zeros_like(labels), poses, weights)
+    # As in upstream: the weights of all count as normalised, those of a cluster do not.
+    with np.errstate(divide="ignore"):
+        covariance[0, 2, 2] -= 2 * np.log(total[0])
+    return ClusterStatistics(labels, each, means, covariances, mean[0], covariance[0])
+
+
+def _moments(labels: Whole, poses: Floats, weights: Floats) -> Tuple[Floats, Floats, Floats]:
+    """Return weight float64[c], mean float64[c, 3] and covariance float64[c, 3, 3] by label."""
+    x, y, yaw = poses.T
+    columns = (np.ones_like(x), x, y, np.cos(yaw), np.sin(yaw))
+    weight, x_sum, y_sum, cos, sin = (np.bincount(labels, weights * one) for one in columns)
+    squares = [np.bincount(labels, weights * a * b) for a, b in ((x, x), (x, y), (y, y))]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean_x, mean_y = x_sum / weight, y_sum / weight
+        xx, xy, yy = (square / weight for square in squares)
+        yaw_variance = -2 * np.log(np.sqrt(cos * cos + sin * sin) / weight)
+    covariances = np.zeros((len(weight), 3, 3))
+    covariances[:, 0, 0], covariances[:, 1, 1] = xx - mean_x * mean_x, yy - mean_y * mean_y
+    covariances[:, 0, 1] = covariances[:, 1, 0] = xy - mean_x * mean_y
+    covariances[:, 2, 2] = yaw_variance
+    return weight, np.column_stack((mean_x, mean_y, np.arctan2(sin, cos))), covariances
