@@ -192,8 +192,8 @@ def _moments(labels: Whole, poses: Floats, weights: Floats) -> Tuple[Floats, Flo
     """Return weight float64[c], mean float64[c, 3] and covariance float64[c, 3, 3] by label."""
     x, y, yaw = poses.T
     columns = (np.ones_like(x), x, y, np.cos(yaw), np.sin(yaw))
-    weight, x_sum, y_sum, cos, sin = (np.bincount(labels, weights * one) for one in columns)
-    squares = [np.bincount(labels, weights * a * b) for a, b in ((x, x), (x, y), (y, y))]
+    weight, x_sum, y_sum, cos, sin = (_sums(labels, weights * one) for one in columns)
+    squares = [_sums(labels, weights * a * b) for a, b in ((x, x), (x, y), (y, y))]
     with np.errstate(divide="ignore", invalid="ignore"):
         mean_x, mean_y = x_sum / weight, y_sum / weight
         xx, xy, yy = (square / weight for square in squares)
@@ -203,3 +203,8 @@ def _moments(labels: Whole, poses: Floats, weights: Floats) -> Tuple[Floats, Flo
     covariances[:, 0, 1] = covariances[:, 1, 0] = xy - mean_x * mean_y
     covariances[:, 2, 2] = yaw_variance
     return weight, np.column_stack((mean_x, mean_y, np.arctan2(sin, cos))), covariances
+
+
+def _sums(labels: Whole, values: Floats) -> Floats:
+    """Add values float64[n] up by label, in their order."""
+    return np.bincount(labels, values).astype(np.float64)

@@ -69,7 +69,7 @@ def beams_of(
     with np.errstate(invalid="ignore"):
         too_short, too_long = ranges_m <= least_m, ranges_m > largest_m
     ranges_m[too_long], ranges_m[too_short] = _NO_RETURN, largest_m
-    bearings_rad = start_rad + np.arange(len(ranges_m)) * step_rad
+    bearings_rad = np.add(start_rad, np.arange(len(ranges_m)) * step_rad)
     return Beams(ranges_m, bearings_rad, float(largest_m))
 
 

@@ -13,8 +13,8 @@ import rospy
 from nav_msgs.msg import OccupancyGrid
 
 from quad_localization.map_files import FREE_UP_TO, OCCUPIED_FROM, save_map
-from quad_localization.ros.map_messages import grid_from_message
 from quad_nav.errors import InputError, printable
+from quad_nav.ros.common.nav_messages import map_from_message
 from quad_nav.ros.common.readiness import init_node
 
 EXIT_BAD_INPUT = 2
@@ -37,7 +37,7 @@ def main() -> int:
     except rospy.ROSException:
         return 0  # Ctrl-C
     try:
-        save_map(grid_from_message(message), Path(given.stem), given.occ, given.free)
+        save_map(map_from_message(message), Path(given.stem), given.occ, given.free)
     except InputError as error:
         print(printable(f"map_saver: {error}"), file=sys.stderr)
         return EXIT_BAD_INPUT
