@@ -11,8 +11,8 @@ from flight_case import FlightCase, Record
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
+from quad_localization.ros.map_saver import map_from_message
 from quad_nav.files.shipped import shipped
-from quad_nav.ros.common.nav_messages import map_from_message
 from quad_nav.scenario.scene_map import scene_occupancy
 from quad_nav.sim.scene_file import load_scene
 

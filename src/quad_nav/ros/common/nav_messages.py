@@ -23,12 +23,12 @@ from std_msgs.msg import Header
 
 from quad_nav.costmap.cost_grid import occupancy
 from quad_nav.costmap.static import StaticMap
-from quad_nav.errors import InputError, InvalidGoal
+from quad_nav.errors import InvalidGoal
 from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
 from quad_nav.grid import GridSpec
 from quad_nav.plan.wavefront import NOT_REACHED
 from quad_nav.ros.common.conversions import pose_from_message, pose_message
-from quad_nav.topics.validation import MAX_MAGNITUDE, grid_problem
+from quad_nav.topics.validation import MAX_MAGNITUDE
 
 INVALID_QUATERNION = "Aborting on goal because it was sent with an invalid quaternion"
 
@@ -96,26 +96,6 @@ def map_message(static_map: StaticMap, stamp: rospy.Time) -> OccupancyGrid:
     message.info.origin.orientation = Quaternion(*quaternion_from_yaw(static_map.yaw_rad))
     message.info.map_load_time = stamp
     return message
-
-
-def map_from_message(message: OccupancyGrid) -> StaticMap:
-    """Return the map of a message.
-
-    The resolution of a message is a float32; the shortest decimal number that it stands for is
-    what its sender has read.
-
-    Raises:
-        InputError: Sizes or numbers are not valid.
-    """
-    info, corner = message.info, message.info.origin.position
-    size, place = (info.width, info.height), (corner.x, corner.y)
-    problem = grid_problem(*size, info.resolution, len(message.data), place)
-    if problem:
-        raise InputError([f"map: {problem}"])
-    spec = GridSpec(*size, float(str(np.float32(info.resolution))), *place)
-    cells = np.array(message.data, np.int8).reshape(spec.shape)
-    yaw_rad = pose_from_message(info.origin).yaw_rad
-    return StaticMap(cells, spec, message.header.frame_id, yaw_rad)
 
 
 def potential_message(
