@@ -1,9 +1,8 @@
 """Know where the robots are: localization on a known map, or on one that grows, and map files.
 
-Reading order of amcl: ``localizer`` (the node without ROS), ``particle_filter`` with
-``histogram``, ``cluster_statistics`` and ``covariance_axes``; ``odometry_models``; ``laser`` with
-``laser_models``, ``scan_beams``, ``likelihood_field`` and ``occupancy_map``; ``parameters``. Of
-slam: ``slam`` and ``growing_map``. ``map_files`` reads and saves maps.
+Reading order of amcl: ``localizer`` (the node without ROS), ``particle_filter`` with ``clusters``
+and ``covariance_axes``; ``odometry_models``; ``laser`` with ``scan_beams`` and ``occupancy_map``;
+``parameters``. Of slam: ``slam`` and ``growing_map``. ``map_files`` reads and saves maps.
 """
 
 from __future__ import annotations

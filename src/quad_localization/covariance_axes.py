@@ -22,52 +22,27 @@ def covariance_axes(covariance: Floats) -> Tuple[Floats, Floats]:
     _diagonalize(axes, diagonal, beside)
     for i in range(2):
         k = i + int(np.argmin(diagonal[i:]))
-        if k != i:
-            diagonal[[i, k]], axes[:, [i, k]] = diagonal[[k, i]], axes[:, [k, i]]
+        diagonal[[i, k]], axes[:, [i, k]] = diagonal[[k, i]], axes[:, [k, i]]
     return axes, diagonal
 
 
 def _tridiagonal(matrix: Floats) -> Tuple[Floats, Floats, Floats]:
-    """Reduce a symmetric matrix: return the transformation, the diagonal and the one beside it."""
-    v, d, e = matrix.astype(np.float64), matrix[2].astype(np.float64), np.zeros(3)
-    for i in (2, 1):
-        scale, h = float(np.sum(np.abs(d[:i]))), 0.0
-        if scale == 0.0:
-            e[i] = d[i - 1]
-            d[:i] = v[i - 1, :i]
-            v[i, :i] = v[:i, i] = 0.0
-        else:
-            d[:i] /= scale
-            h = float(np.sum(d[:i] * d[:i]))
-            f = d[i - 1]
-            g = -math.sqrt(h) if f > 0 else math.sqrt(h)
-            e[i] = scale * g
-            h -= f * g
-            d[i - 1] = f - g
-            v[:i, i] = d[:i]
-            lower = np.tril(v[:i, :i])
-            e[:i] = (lower + np.tril(lower, -1).T) @ d[:i] / h
-            e[:i] -= np.sum(e[:i] * d[:i]) / (h + h) * d[:i]
-            for j in range(i):
-                v[j:i, j] -= d[j] * e[j:i] + e[j] * d[j:i]
-                d[j] = v[i - 1, j]
-                v[i, j] = 0.0
-        d[i] = h
-    for i in range(2):
-        v[2, i], v[i, i] = v[i, i], 1.0
-        h, n = d[i + 1], i + 1
-        if h != 0.0:
-            d[:n] = v[:n, n] / h
-            v[:n, :n] -= np.outer(d[:n], v[:n, n] @ v[:n, :n])
-        v[:n, n] = 0.0
-    diagonal = v[2].copy()
-    v[2] = (0.0, 0.0, 1.0)
-    return v, diagonal, e
+    """Mirror a symmetric matrix: return the transformation, the diagonal and the one beside it."""
+    axes, block, last = np.eye(3), matrix[:2, :2], matrix[2, :2]
+    length = math.hypot(*last)
+    if length > 0.0:  # mirror the last row onto its second axis
+        length = -length if last[1] > 0.0 else length
+        normal = np.array((last[0], last[1] - length))
+        mirror = np.eye(2) - 2.0 / (normal @ normal) * np.outer(normal, normal)
+        axes[:2, :2], block = mirror, mirror @ block @ mirror
+    if block[1, 0] != 0.0:
+        axes[:2, 0] *= -1.0
+    diagonal = np.array((block[0, 0], block[1, 1], matrix[2, 2]))
+    return axes, diagonal, np.array((-block[1, 0], length, 0.0))
 
 
 def _diagonalize(v: Floats, d: Floats, e: Floats) -> None:
     """Rotate until the diagonal ``d`` has the eigenvalues and ``v`` the axes, in place."""
-    e[:2], e[2] = e[1:].copy(), 0.0
     shift, largest, eps = 0.0, 0.0, 2.0**-52
     for k in range(3):
         largest = max(largest, abs(d[k]) + abs(e[k]))

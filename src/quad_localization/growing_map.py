@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_localization.growing_map_kernel import MapView, insert
-from quad_localization.map_files import GridMap
-from quad_nav.geometry import Pose2D
+from quad_nav.costmap.static import StaticMap
+from quad_nav.grid import GridSpec
 
 LEVELS = 3
 _BLOCK_M = 10.0
@@ -72,14 +72,16 @@ class GrowingMap:
             )
             self._seen[level] = np.zeros(grown.shape, np.bool_)
 
-    def grid(self) -> GridMap:
+    def grid(self) -> StaticMap:
         """Return the map with free, occupied and unknown cells."""
         view = self.views[0]
         occupied, free = (math.log(share / (1.0 - share)) for share in (_OCCUPIED, _FREE))
         cells = np.full(view.log_odds.shape, -1, np.int8)
         cells[view.log_odds < free] = 0
         cells[view.log_odds > occupied] = 100
-        return GridMap(cells, view.resolution_m, Pose2D(view.origin_x_m, view.origin_y_m))
+        size_y, size_x = view.log_odds.shape
+        spec = GridSpec(size_x, size_y, view.resolution_m, view.origin_x_m, view.origin_y_m)
+        return StaticMap(cells, spec)
 
 
 def _cells(missing_m: NDArray[np.float64], resolution_m: float) -> NDArray[np.int64]:

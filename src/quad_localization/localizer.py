@@ -6,14 +6,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Dict, Optional, Tuple
+from typing import Dict, Optional
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_localization.laser import Laser
-from quad_localization.likelihood_field import LikelihoodField, likelihood_field
-from quad_localization.occupancy_map import OccupancyMap
+from quad_localization.occupancy_map import OccupancyMap, obstacle_distances
 from quad_localization.odometry_models import angle_difference, moved
 from quad_localization.parameters import BEAM, AmclParams
 from quad_localization.particle_filter import ParticleFilter
@@ -97,7 +96,7 @@ class Amcl:
         self.update_count = 0
         self._random, self._spreads = seeded(seed), 0
         self._grid: Optional[OccupancyMap] = None
-        self._field: Optional[LikelihoodField] = None
+        self._distances_m: Optional[Floats] = None
         self._lasers: Dict[str, Laser] = {}
         self._given: Optional[PoseEstimate] = None  # before the map
         self._has_begun = False  # since the last initialisation
@@ -122,8 +121,7 @@ class Amcl:
 
         A further map leaves the particles where they are; upstream begins anew.
         """
-        self._grid = grid
-        self._make_sensors()
+        self._make_sensors(grid)
         if self.particles is not None and not self.params.upstream:
             self.particles.free_places = grid.free_places
             return
@@ -158,19 +156,19 @@ class Amcl:
         self.params = params
         if self._grid is None or self.particles is None:
             return
-        self._make_sensors()
+        self._make_sensors(self._grid)
         self.particles.params = params
         if params.upstream:
             self.particles = ParticleFilter(params, self._grid.free_places, self._random)
             last = self.estimate or PoseEstimate(Pose2D(0.0, 0.0), np.zeros((3, 3)))
             self._spread(PoseEstimate(last.pose, np.diag(np.diag(last.covariance))))
 
-    def _make_sensors(self) -> None:
-        """Make the likelihood field anew, and forget the lasers."""
-        params, self._lasers, self._field = self.params, {}, None
-        if params.laser_model_type != BEAM and self._grid is not None:
-            distance_m, sigma_m = params.laser_likelihood_max_dist_m, params.laser_sigma_hit_m
-            self._field = likelihood_field(self._grid, distance_m, params.laser_z_hit, sigma_m)
+    def _make_sensors(self, grid: OccupancyMap) -> None:
+        """Measure a map, and forget the lasers."""
+        self._grid, self._lasers, self._distances_m = grid, {}, None
+        if self.params.laser_model_type != BEAM:
+            largest_m = self.params.laser_likelihood_max_dist_m
+            self._distances_m = obstacle_distances(grid, largest_m)
 
     def _spread(self, about: PoseEstimate) -> None:
         assert self.particles is not None
@@ -183,37 +181,40 @@ class Amcl:
 
     def update(self, seen: Observation) -> Optional[Update]:
         """Take a scan; return None if nothing was done with it."""
-        if self.particles is None or self._grid is None:
+        particles, grid, params = self.particles, self._grid, self.params
+        if particles is None or grid is None:
             return None
-        least_m, largest_m = self.params.laser_min_range_m, self.params.laser_max_range_m
-        beams = beams_of(seen.scan, seen.base_from_laser, least_m, largest_m)
-        if beams is None and not self.params.upstream:
-            return None
-        if seen.laser not in self._lasers:  # whose mount stays that of its first scan
-            mount = (float(seen.base_from_laser.x_m), float(seen.base_from_laser.y_m))
-            self._lasers[seen.laser] = Laser(self.params, self._grid, self._field, mount)
-        laser, at = self._lasers[seen.laser], seen.odom_from_base
-        if beams is not None and not self.params.upstream:
+        mount, at = seen.base_from_laser, seen.odom_from_base
+        beams = beams_of(seen.scan, mount, params.laser_min_range_m, params.laser_max_range_m)
+        if not params.upstream:
+            if beams is None:
+                return None
             beams = levelled(beams, at.quaternion)
+        if seen.laser not in self._lasers:  # whose mount stays that of its first scan
+            place = (float(mount.x_m), float(mount.y_m))
+            self._lasers[seen.laser] = Laser(params, grid, self._distances_m, place)
+        laser, begins = self._lasers[seen.laser], not self._has_begun
         odometry = Pose2D(at.x_m, at.y_m, tilted_yaw(at.quaternion))
-        begins = not self._has_begun
         if begins:
             self._odometry, self._has_begun, self.update_count = odometry, True, 0
         if begins or self._is_update_due(odometry):
             for one in self._lasers.values():
                 one.is_due = True
-        is_moved = laser.is_due and not begins
-        if is_moved:
-            self._move(odometry)
-        is_weighed = is_resampled = False
-        shows_cloud = laser.is_due and not self.is_update_requested
-        if laser.is_due:
-            if beams is None:  # upstream has moved the particles, and will move them again
-                return None
-            self._leave_out_peers(beams, seen)
-            is_weighed, is_resampled = self._weigh(laser, beams, odometry)
-        estimate = self._estimate(seen) if is_resampled or begins else None
-        return Update(is_moved, is_weighed, is_resampled, estimate, shows_cloud, self.map_from_odom)
+        if not laser.is_due:
+            return Update(map_from_odom=self.map_from_odom)
+        if not begins:
+            self._move(particles, odometry)
+        if beams is None:  # upstream has moved the particles, and will move them again
+            return None
+        is_weighed = self._weigh(particles, laser, beams, seen)
+        self._odometry = odometry
+        self.update_count += 1
+        is_resampled = self.update_count % max(params.resample_interval, 1) == 0
+        if is_resampled:
+            particles.resample()
+        estimate = self._estimate(particles, at) if is_resampled or begins else None
+        shows_cloud, transform = not self.is_update_requested, self.map_from_odom
+        return Update(not begins, is_weighed, is_resampled, estimate, shows_cloud, transform)
 
     def _is_update_due(self, odometry: Pose2D) -> bool:
         """Tell whether the robot has moved enough, or an update was requested."""
@@ -227,22 +228,24 @@ class Amcl:
             or abs(angle_difference(odometry.yaw_rad, before.yaw_rad)) > params.update_min_a_rad
         )
 
-    def _move(self, odometry: Pose2D) -> None:
-        assert self.particles is not None
-        one, before = self.params, self._odometry
+    def _move(self, particles: ParticleFilter, odometry: Pose2D) -> None:
+        before = self._odometry
         turn_rad = float(angle_difference(odometry.yaw_rad, before.yaw_rad))
         delta = (odometry.x_m - before.x_m, odometry.y_m - before.y_m, turn_rad)
-        alphas = (
-            one.odom_alpha1,
-            one.odom_alpha2,
-            one.odom_alpha3,
-            one.odom_alpha4,
-            one.odom_alpha5,
-        )
         old_yaw_rad = odometry.yaw_rad - turn_rad
-        self.particles.poses = moved(
-            one.odom_model_type, alphas, self.particles.poses, old_yaw_rad, delta, self._random
-        )
+        particles.poses = moved(self.params, particles.poses, old_yaw_rad, delta, self._random)
+
+    def _weigh(
+        self, particles: ParticleFilter, laser: Laser, beams: Beams, seen: Observation
+    ) -> bool:
+        """Weigh the particles by a scan; return false if no beam is in use."""
+        self._leave_out_peers(beams, seen)
+        factors = laser.factors(particles.poses, particles.is_converged, beams)
+        laser.is_due = False
+        if factors is None:
+            return False
+        particles.weigh(factors)
+        return True
 
     def _leave_out_peers(self, beams: Beams, seen: Observation) -> None:
         """Take the ranges of beams that end on peers out; the latest transform says where."""
@@ -258,28 +261,15 @@ class Amcl:
             away_m = np.linalg.norm(ends[:, None] - seen.peers, axis=2).min(axis=1)
         beams.ranges_m[away_m < self.params.peer_radius_m] = np.nan
 
-    def _weigh(self, laser: Laser, beams: Beams, odometry: Pose2D) -> Tuple[bool, bool]:
-        """Weigh the particles by a scan, and resample if due; return what was done."""
-        assert self.particles is not None
-        factors = laser.factors(self.particles.poses, self.particles.is_converged, beams)
-        if factors is not None:
-            self.particles.weigh(factors)
-        laser.is_due, self._odometry = False, odometry
-        self.update_count += 1
-        is_resampled = self.update_count % max(self.params.resample_interval, 1) == 0
-        if is_resampled:
-            self.particles.resample()
-        return factors is not None, is_resampled
-
-    def _estimate(self, seen: Observation) -> Optional[PoseEstimate]:
+    def _estimate(
+        self, particles: ParticleFilter, odom_from_base: Pose3D
+    ) -> Optional[PoseEstimate]:
         """Return the mean of the heaviest cluster, and note the transform that follows."""
-        assert self.particles is not None
-        statistics = self.particles.statistics
+        statistics = particles.statistics
         if statistics.best < 0:
             return None
         pose = Pose2D(*statistics.means[statistics.best].tolist())
         self.estimate = PoseEstimate(pose, statistics.covariance)
-        odom_from_base = seen.odom_from_base
         if not self.params.upstream:  # which puts a quadcopter, and its LIDAR, on the floor
             odom_from_base = odom_from_base.to_2d().to_3d()
         self.map_from_odom = pose.to_3d().compose(odom_from_base.inverse())

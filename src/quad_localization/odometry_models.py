@@ -10,11 +10,12 @@ ros-planning/navigation, amcl 1.17.3.
 from __future__ import annotations
 
 import math
-from typing import Any, Sequence, Tuple
+from typing import Any, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_localization.parameters import AmclParams
 from quad_localization.random_numbers import State, normals
 
 Floats = NDArray[np.float64]
@@ -31,25 +32,22 @@ def angle_difference(a: Any, b: Any) -> Any:
     return np.where(np.abs(direct) < np.abs(other), direct, other)
 
 
-def moved(
-    model: str, alphas: Sequence[float], poses: Floats, old_yaw: float, delta: Delta, state: State
-) -> Floats:
+def moved(params: AmclParams, poses: Floats, old_yaw: float, delta: Delta, state: State) -> Floats:
     """Return poses float64[m, 3], metres and radians, after a motion.
 
     Args:
-        model: The parameter ``odom_model_type``.
-        alphas: The parameters ``odom_alpha1`` to ``odom_alpha5``.
+        params: Parameters of the model.
         poses: Poses before.
         old_yaw: Heading of the odometry before, radians.
         delta: Change of the odometry in its frame: x, y in metres, yaw in radians.
         state: Of the random numbers, changed.
     """
     way, bearing = math.sqrt(delta[0] * delta[0] + delta[1] * delta[1]), 0.0
-    is_corrected, is_diff = model.endswith("-corrected"), model.startswith("diff")
+    is_diff = params.odom_model_type.startswith("diff")
     if not is_diff or way >= _LEAST_WAY_M:
         bearing = float(angle_difference(math.atan2(delta[1], delta[0]), old_yaw))
-    variances = (_diff if is_diff else _omni)(way, bearing, delta[2], alphas, is_corrected)
-    noise = np.sqrt(variances) if is_corrected else np.array(variances)
+    variances = np.array((_diff if is_diff else _omni)(params, way, bearing, delta[2]))
+    noise = np.sqrt(variances) if _is_corrected(params) else variances
     noise = noise * normals(state, 3 * len(poses)).reshape(-1, 3)
     if not is_diff:
         cos, sin = np.cos(bearing + poses[:, 2]), np.sin(bearing + poses[:, 2])
@@ -62,29 +60,35 @@ def moved(
     return poses + np.column_stack((way_ * np.cos(yaw), way_ * np.sin(yaw), turn1 + turn2))
 
 
-def _diff(way: float, turn1: float, turn: float, alphas: Sequence[float], _: bool) -> Delta:
+def _is_corrected(params: AmclParams) -> bool:
+    return params.odom_model_type.endswith("-corrected")
+
+
+def _diff(params: AmclParams, way: float, turn1: float, turn: float) -> Delta:
     """Return the variances of the first turn, the way and the second turn."""
-    noises = []
+    squares = []
     for one in (turn1, angle_difference(turn, turn1)):  # backward motion counts like forward
-        noises.append(min(abs(angle_difference(one, way)) for way in (0.0, math.pi)))
-    squares = [float(one * one) for one in noises]
-    of_way = way * way
+        least = min(abs(angle_difference(one, ahead)) for ahead in (0.0, math.pi))
+        squares.append(float(least * least))
+    square1, square2, of_way = *squares, way * way
     return (
-        alphas[0] * squares[0] + alphas[1] * of_way,
-        alphas[2] * of_way + alphas[3] * squares[0] + alphas[3] * squares[1],
-        alphas[0] * squares[1] + alphas[1] * of_way,
+        params.odom_alpha1 * square1 + params.odom_alpha2 * of_way,
+        params.odom_alpha3 * of_way + params.odom_alpha4 * square1 + params.odom_alpha4 * square2,
+        params.odom_alpha1 * square2 + params.odom_alpha2 * of_way,
     )
 
 
-def _omni(way: float, _: float, turn: float, alphas: Sequence[float], corrected: bool) -> Delta:
+def _omni(params: AmclParams, way: float, _: float, turn: float) -> Delta:
     """Return the variances of the way, the turn and the way aside.
 
     The corrected model exchanges the roles of alpha1 and alpha4.
     """
-    own, other = (alphas[0], alphas[3]) if corrected else (alphas[3], alphas[0])
+    own, other = params.odom_alpha4, params.odom_alpha1
+    if _is_corrected(params):
+        own, other = other, own
     of_way, of_turn = way * way, turn * turn
     return (
-        alphas[2] * of_way + other * of_turn,
-        own * of_turn + alphas[1] * of_way,
-        other * of_turn + alphas[4] * of_way,
+        params.odom_alpha3 * of_way + other * of_turn,
+        own * of_turn + params.odom_alpha2 * of_way,
+        other * of_turn + params.odom_alpha5 * of_way,
     )

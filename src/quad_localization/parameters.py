@@ -43,14 +43,6 @@ def _share(name: str, default: float, sentence: str, high: float = 1) -> Any:
     return number(name, default, "", 0, high, sentence)
 
 
-def _limit(name: str, sentence: str) -> Any:
-    return signed(name, -1.0, "m", -1, 1000, sentence)
-
-
-def _place(name: str, default: float, unit: str, sentence: str) -> Any:
-    return fixed_number(name, default, unit, sentence, ANY)
-
-
 @dataclass(frozen=True)
 class AmclParams:
     """Parameters of ``amcl``, in the order of upstream's ``.cfg`` file, then those read once."""
@@ -79,8 +71,8 @@ class AmclParams:
     save_pose_rate_hz: float = signed("save_pose_rate", 0.5, "Hz", -1, 10, "Of saving; -1: never.")
     use_map_topic: bool = flag("use_map_topic", False, "Take maps from the topic; read once.")
     first_map_only: bool = flag("first_map_only", False, "Take one map from it; read once.")
-    laser_min_range_m: float = _limit("laser_min_range", "Least range; -1: the scan's.")
-    laser_max_range_m: float = _limit("laser_max_range", "Largest range; -1: the scan's.")
+    laser_min_range_m: float = signed("laser_min_range", -1.0, "m", -1, 1000, "-1: the scan's.")
+    laser_max_range_m: float = signed("laser_max_range", -1.0, "m", -1, 1000, "-1: the scan's.")
     laser_max_beams: int = whole("laser_max_beams", 30, "", 0, 250, "Beams of a scan in use.")
     laser_z_hit: float = _share("laser_z_hit", 0.95, "Weight of hits.")
     laser_z_short: float = _share("laser_z_short", 0.1, "Weight of short ranges (beam).")
@@ -108,9 +100,9 @@ class AmclParams:
     selective_resampling: bool = fixed_flag(
         "selective_resampling", False, "Resample below half the effective particles only."
     )
-    initial_pose_x_m: float = _place("initial_pose_x", 0.0, "m", "Pose with the first map.")
-    initial_pose_y_m: float = _place("initial_pose_y", 0.0, "m", "The same.")
-    initial_pose_a_rad: float = _place("initial_pose_a", 0.0, "rad", "The same.")
+    initial_pose_x_m: float = fixed_number("initial_pose_x", 0.0, "m", "With the first map.", ANY)
+    initial_pose_y_m: float = fixed_number("initial_pose_y", 0.0, "m", "The same.", ANY)
+    initial_pose_a_rad: float = fixed_number("initial_pose_a", 0.0, "rad", "The same.", ANY)
     initial_cov_xx: float = fixed_number("initial_cov_xx", 0.25, "m^2", "Its variance in x.")
     initial_cov_yy: float = fixed_number("initial_cov_yy", 0.25, "m^2", "Its variance in y.")
     initial_cov_aa: float = fixed_number("initial_cov_aa", _YAW_VARIANCE, "rad^2", "Of the yaw.")

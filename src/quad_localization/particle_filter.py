@@ -12,9 +12,16 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_localization.cluster_statistics import ClusterStatistics, cluster_statistics
+from quad_localization.clusters import (
+    TURN_CELLS,
+    ClusterStatistics,
+    Histogram,
+    add_pose,
+    add_poses,
+    cluster_statistics,
+    new_histogram,
+)
 from quad_localization.covariance_axes import covariance_axes
-from quad_localization.histogram import TURN_CELLS, Histogram, add_pose, add_poses, new_histogram
 from quad_localization.parameters import AmclParams
 from quad_localization.random_numbers import State, normals, uniform
 from quad_nav.files.kernel_cache import njit

@@ -59,15 +59,16 @@ def beams_of(
         least_m = max(least_m, np.float32(min_range_m))
     if not (largest_m > 0.0 and least_m >= 0.0):
         return None
-    first, second = np.float32(scan.angle_min_rad), np.float32(scan.angle_increment_rad)
-    start_rad = _turned(base_from_laser.quaternion, float(first))
-    step_rad = _turned(base_from_laser.quaternion, float(first + second)) - start_rad
-    step_rad = math.fmod(step_rad + 5 * math.pi, 2 * math.pi) - math.pi
+    first, step = np.float32(scan.angle_min_rad), np.float32(scan.angle_increment_rad)
+    start_rad, second_rad = (
+        tilted_yaw(multiply_quaternions(base_from_laser.quaternion, quaternion_from_yaw(angle_rad)))
+        for angle_rad in (float(first), float(first + step))
+    )
+    step_rad = math.fmod(second_rad - start_rad + 5 * math.pi, 2 * math.pi) - math.pi
     ranges_m = scan.ranges_m.astype(np.float64)
     with np.errstate(invalid="ignore"):
         too_short, too_long = ranges_m <= least_m, ranges_m > largest_m
-    ranges_m[too_long] = _NO_RETURN
-    ranges_m[too_short] = largest_m
+    ranges_m[too_long], ranges_m[too_short] = _NO_RETURN, largest_m
     bearings_rad = np.add(start_rad, np.arange(len(ranges_m)) * step_rad)
     return Beams(ranges_m, bearings_rad, float(largest_m))
 
@@ -87,13 +88,6 @@ def levelled(beams: Beams, odom_from_base: Quaternion) -> Beams:
     ranges_m[is_return & (np.abs(z * np.where(is_return, ranges_m, 0.0)) > _BAND_M)] = np.nan
     ranges_m[is_return] *= np.hypot(x, y)[is_return]
     return replace(beams, ranges_m=ranges_m, bearings_rad=np.arctan2(y, x))
-
-
-def _turned(quaternion: Quaternion, angle_rad: float) -> float:
-    """Return the yaw of a direction in the laser's plane, seen from the base."""
-    x, y, z, w = quaternion
-    sin, cos = math.sin(0.5 * angle_rad), math.cos(0.5 * angle_rad)
-    return tilted_yaw((x * cos + y * sin, y * cos - x * sin, w * sin + z * cos, w * cos - z * sin))
 
 
 def tilted_yaw(quaternion: Quaternion) -> float:

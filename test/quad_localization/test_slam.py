@@ -11,7 +11,6 @@ from quad_localization.growing_map import GrowingMap
 from quad_localization.slam import Slam, SlamParams
 from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, Pose3D, Scan, quaternion_from_yaw
-from quad_nav.grid import GridSpec
 from quad_nav.scenario.scene_map import scene_occupancy
 from quad_nav.sim.casters import kernel_lidars
 from quad_nav.sim.flight import BodyState
@@ -105,13 +104,11 @@ def test_the_map_is_that_of_the_scene(arena):
     ways.add_scan(slam, 0)
     along(slam, ways, 0, (0.0, 8.0, 1.0))
     grid = slam.map.grid()
-    height, width = grid.occupancy.shape
-    spec = GridSpec(width, height, grid.resolution_m, grid.origin.x_m, grid.origin.y_m)
-    near = scene_occupancy(arena, spec, 1.5 * grid.resolution_m) == 100
+    near = scene_occupancy(arena, grid.spec, 1.5 * grid.spec.resolution_m) == 100
     occupied = grid.occupancy == 100
     assert occupied.sum() > 500
     assert (occupied & near).sum() > 0.98 * occupied.sum()
-    inside = scene_occupancy(arena, spec) == 100
+    inside = scene_occupancy(arena, grid.spec) == 100
     assert not (inside & (grid.occupancy == 0)).sum() > 0.01 * occupied.sum()
 
 
@@ -173,7 +170,7 @@ def test_beams_that_end_on_a_peer_leave_no_trace(tmp_path):
     grid = slam.map.grid()
     columns, rows = (
         [round((c + d - o) / 0.05) for d in (-0.5, 0.5)]
-        for c, o in ((5.0, grid.origin.x_m), (4.0, grid.origin.y_m))
+        for c, o in ((5.0, grid.spec.origin_x_m), (4.0, grid.spec.origin_y_m))
     )
     assert grid.occupancy[slice(*rows), slice(*columns)].max() < 100
 
@@ -191,8 +188,8 @@ def test_a_map_grows_to_hold_what_is_seen():
     grown.insert(np.array([0.05, 0.05]), np.array([[0.55, 0.05]]))
     grown.insert(np.array([0.05, 0.05]), np.array([[30.05, 0.05]]))
     grid = grown.grid()
-    row = round((0.0 - grid.origin.y_m) / 0.1)
-    first = round((0.0 - grid.origin.x_m) / 0.1)
+    row = round((0.0 - grid.spec.origin_y_m) / 0.1)
+    first = round((0.0 - grid.spec.origin_x_m) / 0.1)
     assert grid.occupancy[row, first : first + 5].tolist() == [-1] * 5  # free once is not sure
     assert grid.occupancy[row, first + 300] == 100
     assert (grid.occupancy[row + 1] == -1).all()

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fake_navigator import GOAL, HERE, FakeRecovery, Flight
 from flight_faults import NoPose, NoScans
-from test_navigator import GOAL, HERE, FakeRecovery, Flight
 from test_tracking_flights import walker
 
 from quad_moving.evasion import Evasion

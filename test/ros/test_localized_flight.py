@@ -11,9 +11,8 @@ from flight_case import FlightCase, Record
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
-from quad_localization.ros.map_messages import grid_from_message
+from quad_localization.ros.map_saver import map_from_message
 from quad_nav.files.shipped import shipped
-from quad_nav.grid import GridSpec
 from quad_nav.scenario.scene_map import scene_occupancy
 from quad_nav.sim.scene_file import load_scene
 
@@ -35,14 +34,12 @@ class LocalizedFlight(FlightCase):
             self.assertGreater(drift_m, 0.1, "odometry has drifted, and somebody corrects it")
             self.assertAlmostEqual(frame.translation.z, 0.0)
             self.assertGreater(len(poses[i].messages), 50)
-        self.check_map(grid_from_message(maps.messages[-1]))
+        self.check_map(map_from_message(maps.messages[-1]))
 
     def check_map(self, grid):
         """The occupied cells are on the scene's surfaces, to within two cells."""
-        height, width = grid.occupancy.shape
-        spec = GridSpec(width, height, grid.resolution_m, grid.origin.x_m, grid.origin.y_m)
         scene = load_scene(shipped("scenes", "arena.yaml"))
-        near = scene_occupancy(scene, spec, 2.0 * grid.resolution_m) == 100
+        near = scene_occupancy(scene, grid.spec, 2.0 * grid.spec.resolution_m) == 100
         occupied = grid.occupancy == 100
         share = np.count_nonzero(occupied & near) / np.count_nonzero(occupied)
         print(f"occupied cells: {np.count_nonzero(occupied)}, on the scene: {share:.3f}")

@@ -12,7 +12,8 @@ import nicegui
 import pytest
 from raw_page import channel, get, handshake_head, masked, memory_bytes, raw_page
 from stream_client import open_stream
-from synthetic import SyntheticActions, SyntheticFleet
+from synthetic import SyntheticFleet
+from synthetic_actions import SyntheticActions
 from websockets.exceptions import ConnectionClosed
 
 from quad_web import connections, page_limits

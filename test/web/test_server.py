@@ -14,7 +14,8 @@ from urllib.parse import urlsplit
 import pytest
 from raw_page import handshake_head
 from stream_client import open_stream
-from synthetic import SyntheticActions, SyntheticFleet
+from synthetic import SyntheticFleet
+from synthetic_actions import SyntheticActions
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 

@@ -9,13 +9,17 @@ import argparse
 import sys
 from pathlib import Path
 
+import numpy as np
 import rospy
 from nav_msgs.msg import OccupancyGrid
 
 from quad_localization.map_files import FREE_UP_TO, OCCUPIED_FROM, save_map
-from quad_localization.ros.map_messages import grid_from_message
+from quad_nav.costmap.static import StaticMap
 from quad_nav.errors import InputError, printable
+from quad_nav.grid import GridSpec
+from quad_nav.ros.common.conversions import pose_from_message
 from quad_nav.ros.common.readiness import init_node
+from quad_nav.topics.validation import grid_problem
 
 EXIT_BAD_INPUT = 2
 
@@ -37,13 +41,33 @@ def main() -> int:
     except rospy.ROSException:
         return 0  # Ctrl-C
     try:
-        save_map(grid_from_message(message), Path(given.stem), given.occ, given.free)
+        save_map(map_from_message(message), Path(given.stem), given.occ, given.free)
     except InputError as error:
         print(printable(f"map_saver: {error}"), file=sys.stderr)
         return EXIT_BAD_INPUT
     rospy.loginfo("map_saver: %s.pgm and %s.yaml are written", given.stem, given.stem)
     rospy.signal_shutdown("the map is saved")
     return 0
+
+
+def map_from_message(message: OccupancyGrid) -> StaticMap:
+    """Return the map of a message.
+
+    The resolution of a message is a float32; the shortest decimal number that it stands for is
+    what its sender has read.
+
+    Raises:
+        InputError: Sizes or numbers are not valid.
+    """
+    info, corner = message.info, message.info.origin.position
+    size, place = (info.width, info.height), (corner.x, corner.y)
+    problem = grid_problem(*size, info.resolution, len(message.data), place)
+    if problem:
+        raise InputError([f"map: {problem}"])
+    spec = GridSpec(*size, float(str(np.float32(info.resolution))), *place)
+    cells = np.array(message.data, np.int8).reshape(spec.shape)
+    yaw_rad = pose_from_message(info.origin).yaw_rad
+    return StaticMap(cells, spec, message.header.frame_id, yaw_rad)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import List, Tuple
 
@@ -22,9 +23,9 @@ from nav_msgs.srv import (
 )
 
 from quad_localization.map_files import CELL_M, read_map
-from quad_localization.ros.map_messages import grid_message
 from quad_nav.errors import InputError
 from quad_nav.files.values import is_number
+from quad_nav.ros.common.nav_messages import map_message
 from quad_nav.ros.common.readiness import init_node
 
 EXIT_BAD_INPUT = 2
@@ -49,9 +50,8 @@ class MapServer:
         rospy.Service("change_map", LoadMap, self._change)
 
     def _read(self, path: Path) -> OccupancyGrid:
-        message = grid_message(read_map(path, self._resolution_m), self._frame)
-        message.info.map_load_time = message.header.stamp = rospy.Time.now()
-        return message
+        found = replace(read_map(path, self._resolution_m), frame=self._frame)
+        return map_message(found, rospy.Time.now())
 
     def _publish(self) -> None:
         self._grid.publish(self._message)

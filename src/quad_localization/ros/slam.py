@@ -18,7 +18,6 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
-from quad_localization.ros.map_messages import grid_message
 from quad_localization.slam import Slam, SlamPose
 from quad_localization.warm_up import warm_up_slam
 from quad_nav.errors import excerpt
@@ -33,6 +32,7 @@ from quad_nav.ros.common.conversions import (
     transform_message,
 )
 from quad_nav.ros.common.diagnostics import ThrottledWarnings, publish_health
+from quad_nav.ros.common.nav_messages import map_message
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.topics.health import Health, Level
@@ -183,9 +183,7 @@ class SlamNode:
         if self._slam.map.is_empty or self._now_s - self._map_s < MAP_PERIOD_S:
             return
         self._map_s = self._now_s
-        message = grid_message(self._slam.map.grid(), "map")
-        message.header.stamp = message.info.map_load_time = rospy.Time(self._now_s)
-        self._map.publish(message)
+        self._map.publish(map_message(self._slam.map.grid(), rospy.Time(self._now_s)))
 
     def _health(self) -> List[Health]:
         with self._lock:

@@ -26,11 +26,13 @@ class StaticMap:
         occupancy: int8[H, W], 0..100, or -1 for unknown.
         spec: Grid of the map.
         frame: Frame of the map.
+        yaw_rad: Heading of the grid about its lower left corner, which costmaps ignore.
     """
 
     occupancy: NDArray[np.int8]
     spec: GridSpec
     frame: str = "map"
+    yaw_rad: float = 0.0
 
 
 @dataclass(frozen=True)

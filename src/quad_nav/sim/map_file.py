@@ -64,8 +64,8 @@ class MapFields:
 
 
 @dataclass(frozen=True)
-class OccupancyMap:
-    """Occupancy of a map's cells.
+class MapFile:
+    """Content of a map's YAML file and image.
 
     Attributes:
         fields: Content of the YAML file.
@@ -122,7 +122,7 @@ class OccupancyMap:
         return boxes
 
 
-def load_map(document: Any, path: Path) -> OccupancyMap:
+def load_map(document: Any, path: Path) -> MapFile:
     """Check the parsed document of a map's YAML file and read the image.
 
     Raises:
@@ -141,7 +141,7 @@ def load_map(document: Any, path: Path) -> OccupancyMap:
         for key in document
         if key not in _KEYS
     ]
-    return OccupancyMap(fields, occupancy_of(pixels, fields), tuple(remarks))
+    return MapFile(fields, occupancy_of(pixels, fields), tuple(remarks))
 
 
 def occupancy_of(pixels: Pixels, fields: MapFields) -> Cells:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from test_navigator import FORWARD, GOAL, HERE, FakeRecovery, Flight
+from fake_navigator import FORWARD, GOAL, HERE, FakeRecovery, Flight
 from upstream import UPSTREAM
 
 from quad_nav import config

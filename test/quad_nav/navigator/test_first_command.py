@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from test_navigator import FORWARD, GOAL, FakeRecovery, Flight, outcomes
+from fake_navigator import FORWARD, GOAL, FakeRecovery, Flight, outcomes
 from upstream import UPSTREAM
 
 from quad_nav.geometry import Pose2D, Twist2D

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from test_navigator import GOAL, HERE, Flight
+from fake_navigator import GOAL, HERE, Flight
 
 from quad_nav.geometry import Twist2D
 from quad_nav.navigator.tick import RobotPoses

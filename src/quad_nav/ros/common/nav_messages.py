@@ -91,8 +91,11 @@ def grid_message(spec: GridSpec, costs: np.ndarray, frame: str, stamp: rospy.Tim
 
 
 def map_message(static_map: StaticMap, stamp: rospy.Time) -> OccupancyGrid:
-    """Convert a map."""
-    return _occupancy_grid(static_map.spec, static_map.occupancy, static_map.frame, stamp)
+    """Convert a map that is loaded at a time."""
+    message = _occupancy_grid(static_map.spec, static_map.occupancy, static_map.frame, stamp)
+    message.info.origin.orientation = Quaternion(*quaternion_from_yaw(static_map.yaw_rad))
+    message.info.map_load_time = stamp
+    return message
 
 
 def potential_message(
