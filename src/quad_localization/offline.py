@@ -47,7 +47,11 @@ class SlamLocalization:
 
 
 class AmclLocalization:
-    """``Amcl`` of each robot for the loop, on the map of the scene."""
+    """``Amcl`` of each robot for the loop, on the map of the scene.
+
+    Attributes:
+        amcls: By the robots' numbers.
+    """
 
     def __init__(self, scene: Scene, robots: int) -> None:
         """Begin at the scene's start poses, from which robots may be displaced.
@@ -65,8 +69,8 @@ class AmclLocalization:
             drawn.occupancy, spec.resolution_m, spec.origin_x_m, spec.origin_y_m
         )
         spread = np.diag([params.initial_cov_xx, params.initial_cov_yy, params.initial_cov_aa])
-        self._amcls = [Amcl(params, seed=robot) for robot in range(robots)]
-        for amcl, start in zip(self._amcls, scene.starts):
+        self.amcls = [Amcl(params, seed=robot) for robot in range(robots)]
+        for amcl, start in zip(self.amcls, scene.starts):
             amcl.set_map(grid, PoseEstimate(start, spread))
         self._odom_from_base: Dict[int, Pose3D] = {}
 
@@ -78,21 +82,19 @@ class AmclLocalization:
         places = [self._place(peer) for peer in self._odom_from_base if peer != robot]
         base_from_lidar = odom_from_base.inverse().compose(odom_from_lidar)
         peers = np.array([(one.x_m, one.y_m) for one in places]).reshape(-1, 2)
-        self._amcls[robot].update(
-            Observation("lidar", scan, base_from_lidar, odom_from_base, peers)
-        )
+        self.amcls[robot].update(Observation("lidar", scan, base_from_lidar, odom_from_base, peers))
 
     def _place(self, robot: int) -> Pose2D:
         return self.map_from_odom(robot).compose(self._odom_from_base[robot].to_2d())
 
     def map_from_odom(self, robot: int) -> Pose2D:
         """Return where a robot's odometry frame is."""
-        pose = self._amcls[robot].map_from_odom
+        pose = self.amcls[robot].map_from_odom
         return Pose2D(0.0, 0.0) if pose is None else pose.to_2d()
 
     def is_lost(self, robot: int) -> bool:
         """Return whether a robot does not know its place, so that it has to hover."""
-        return self._amcls[robot].estimate is None or self._amcls[robot].is_lost
+        return self.amcls[robot].estimate is None or self.amcls[robot].is_lost
 
 
 MAKERS = {"amcl": AmclLocalization, "slam": SlamLocalization}
@@ -100,19 +102,23 @@ MAKERS = {"amcl": AmclLocalization, "slam": SlamLocalization}
 
 
 class LocalizationErrors(FlightObserver):
-    """Differences of all robots' believed poses to the true ones, at every odometry."""
+    """Differences of all robots' believed poses to the true ones, at every odometry.
+
+    Attributes:
+        errors: float64[n, 2] of the robots at each, in m and rad.
+    """
 
     needs_single_process = True
 
     def __init__(self) -> None:
-        self._errors: List[NDArray[np.float64]] = []
+        self.errors: List[NDArray[np.float64]] = []
 
     def on_move(self, flight: Flight) -> None:
         """Note the errors of now."""
         believed = believed_states(flight.states, flight.loop.group.localization)
         errors = believed.poses - flight.states.poses
         turns_rad = np.abs(np.remainder(errors[:, 2] + math.pi, 2.0 * math.pi) - math.pi)
-        self._errors.append(np.column_stack([np.hypot(errors[:, 0], errors[:, 1]), turns_rad]))
+        self.errors.append(np.column_stack([np.hypot(errors[:, 0], errors[:, 1]), turns_rad]))
 
     @property
     def note(self) -> str:
@@ -130,7 +136,7 @@ class LocalizationErrors(FlightObserver):
 
     def figures(self) -> Dict[str, Any]:
         """Return the errors' medians and 95th percentiles, rounded to 1 mm and 1 mrad."""
-        errors = np.concatenate(self._errors) if self._errors else np.zeros((1, 2))
+        errors = np.concatenate(self.errors) if self.errors else np.zeros((1, 2))
         (middle_m, middle_rad), (high_m, high_rad) = np.percentile(
             errors, [50, 95], axis=0
         ).tolist()

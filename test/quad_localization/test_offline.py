@@ -10,8 +10,10 @@ import pytest
 from click.testing import CliRunner
 
 from quad_localization.offline import MAKERS, LocalizationErrors, SlamLocalization
+from quad_nav import config
 from quad_nav.cli.__main__ import main
 from quad_nav.cli.fly import LOCALIZATIONS
+from quad_nav.config.robot_tree import RobotSource, robot_tree
 from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, quaternion_from_yaw
 from quad_nav.loop import offline_setup
@@ -92,3 +94,16 @@ def test_after_a_reset_the_map_is_made_anew():
     assert loop.group.localization is not before
     assert loop.group.localization.is_lost(1), "no scan yet"
     loop.close()
+
+
+def test_the_configuration_changes_the_default_where_poses_err():
+    default, localized = (
+        config.load(robot_tree(RobotSource(one, 3))) for one in ("default", "localized")
+    )
+    assert localized.remarks == ()
+    assert localized.peers.margin_m == pytest.approx(0.1)
+    assert localized.global_costmap == default.global_costmap
+    assert localized.local_costmap == default.local_costmap
+    assert localized.local_planner == default.local_planner
+    report = CliRunner().invoke(main, ["check", "localized"])
+    assert report.exit_code == 0, report.output

@@ -39,7 +39,8 @@ OUTPUT = click.Path(dir_okay=False, allow_dash=True, path_type=Path)
 """Type of an option whose text ``-`` sends to standard output."""
 LOOPBACK = "127.0.0.1"
 CONFIGURATIONS = (
-    "'barn', 'default', 'moving', 'people', 'tutorial', a folder, a YAML or launch file"
+    "'barn', 'default', 'localized', 'moving', 'people', 'tutorial', a folder, a YAML or launch"
+    " file"
 )
 """What ``--config`` takes; listing the shipped folder would slow every start of ``quad``."""
 
