@@ -16,7 +16,6 @@ from quad_nav.sim.odometry import OdomFrames
 from quad_nav.sim.robot_state import RobotStates
 from quad_nav.sim.scene import Scene
 
-
 Estimate = Tuple[Pose2D, NDArray[np.float64]]
 """A pose in ``map``, and its covariance float64[3, 3] of x, y in metres and yaw in radians."""
 
