@@ -3,7 +3,13 @@
  */
 
 import { boundsOf } from "./fleet.js";
-import { drawContacts, drawGoals, drawTracks, drawYields } from "./map_marks.js";
+import {
+  drawContacts,
+  drawGoals,
+  drawLocalizations,
+  drawTracks,
+  drawYields,
+} from "./map_marks.js";
 import { drawCells, drawPaths, drawScans } from "./map_paths.js";
 import { drawNumbers, drawRobot, drawnRadius } from "./map_robots.js";
 import { CostmapImages, drawCostmaps, drawFloor, drawObstacles, drawSolids } from "./map_scene.js";
@@ -115,6 +121,7 @@ export class MapView {
     drawObstacles(context, viewport, fleet.obstacles, fleet.altitude);
     drawCells(context, viewport, fleet.cells);
     drawTracks(context, toScreen, fleet.tracks);
+    drawLocalizations(context, toScreen, fleet.localizations);
     drawPaths(context, viewport, fleet);
     drawGoals(context, toScreen, fleet.goals, fleet.selected !== null);
     drawScans(context, viewport, fleet.scans);
