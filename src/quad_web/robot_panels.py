@@ -170,11 +170,12 @@ class RobotCard:
         self._values: Dict[str, ui.label] = {}
         with self._facts:
             for name in (*_FACTS, _LOCALIZATION):
-                with ui.element("div") as self._located:
+                with ui.element("div") as self._located:  # the last one is that of localization
                     with ui.element("dt"):
                         ui.label(name)
                     with ui.element("dd"):
                         self._values[name] = ui.label("–")
+            self._located.classes("wide")
 
     def _make_actions(self) -> None:
         client = self._client

@@ -11,6 +11,8 @@ import pytest
 
 rospy = pytest.importorskip("rospy")
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
+from geometry_msgs.msg import PoseWithCovariance, PoseWithCovarianceStamped  # noqa: E402
 from quad import msg  # noqa: E402
 from std_msgs.msg import Header, String  # noqa: E402
 
@@ -19,7 +21,7 @@ from quad_nav.geometry import Pose3D, quaternion_from_yaw  # noqa: E402
 from quad_nav.mission.flight_log import Leg  # noqa: E402
 from quad_nav.mission.goal import Goal  # noqa: E402
 from quad_nav.mission.summary import MissionSummary, RobotSummary, to_json  # noqa: E402
-from quad_nav.ros.common.conversions import pose_array_message  # noqa: E402
+from quad_nav.ros.common.conversions import pose_array_message, pose_message  # noqa: E402
 from quad_nav.ros.common.packed_messages import STATES_TOPIC, States, states_message  # noqa: E402
 from quad_nav.sim.motion import Motion, Walkers  # noqa: E402
 from quad_nav.sim.movers import Movers  # noqa: E402
@@ -28,7 +30,9 @@ from quad_nav.sim.scene import MovingObstacle, Scene, Walls  # noqa: E402
 from quad_nav.topics.mission_events import SUMMARY_TOPIC  # noqa: E402
 from quad_nav.topics.obstacle_poses import POSES_TOPIC  # noqa: E402
 from quad_nav.topics.tracked_obstacles import obstacle_fields  # noqa: E402
+from quad_web.ros.health import FleetHealth  # noqa: E402
 from quad_web.ros.layers import Layers  # noqa: E402
+from quad_web.ros.localizations import Localizations, cloud_places  # noqa: E402
 from quad_web.ros.obstacles import Obstacles  # noqa: E402
 from quad_web.ros.poses import Bodies  # noqa: E402
 from quad_web.ros.reports import FlightReports  # noqa: E402
@@ -140,6 +144,47 @@ def test_samples_are_a_tenth_of_a_second_apart_at_any_rate(monkeypatch):
     items = sample_items(samples, 0.3, lambda places, _: np.hypot(*places.T), np.zeros(2))
     gaps = [item.arrays["values"][0, 0] for item in items]
     assert min(gaps) == pytest.approx(0.4) and np.median(gaps) == pytest.approx(2.4)
+
+
+def test_a_robot_is_localized_as_amcl_or_slam_tell():
+    """The particles are a line of 1000; a page gets each fourth, and nothing twice."""
+    health = FleetHealth(2)
+    localizations = Localizations(2, health)
+    shown = frozenset((0, 1))
+    assert localizations.topics(shown) == {} and localizations.items(shown) == []
+    hear_health = health.topics()["/diagnostics"].callback
+    hear_health(DiagnosticArray(status=[DiagnosticStatus(name="amcl0: Standard deviation")]))
+    lost = DiagnosticStatus(name="quad1: localization", level=2, message="lost: scans do not fit")
+    hear_health(DiagnosticArray(status=[lost]))
+    topics = localizations.topics(shown)
+    assert set(topics) == {"/amcl_pose0", "/particlecloud0", "/slam_pose1"}
+    pose = PoseWithCovariance(pose_message(Pose3D(2.0, 3.0, 1.0)), [float(i) for i in range(36)])
+    deliver(topics["/amcl_pose0"], PoseWithCovarianceStamped(Header(frame_id="map"), pose))
+    places = np.column_stack((np.arange(1000.0), np.zeros(1000), np.zeros(1000)))
+    deliver(topics["/particlecloud0"], pose_array_message(places, 1.0))
+    first, second = localizations.items(shown)
+    assert first.arrays["pose"].tolist() == [2.0, 3.0, 0.0, 0.0, 1.0, 7.0, 35.0]
+    assert first.arrays["points"][:, 0].tolist() == list(range(0, 1000, 4))
+    assert (first.data["is_lost"], second.data["is_lost"]) == (False, True)
+    assert localizations.items(shown) == []
+    assert localizations.located(0).row() == {
+        "is_lost": False,
+        "searches": True,
+        "yaw": 0.0,
+        "deviation_m": pytest.approx(math.sqrt(7.0)),
+    }
+    assert localizations.located(1).row() == {"is_lost": True, "searches": False}
+    deliver(topics["/amcl_pose0"], PoseWithCovarianceStamped(Header(frame_id="odom0"), pose))
+    assert localizations.items(shown) == []  # dropped, with a warning
+
+
+@pytest.mark.parametrize("cut", [0, 10, 20, 30, 90])
+def test_a_particle_cloud_that_is_cut_is_refused(cut):
+    buffer = io.BytesIO()
+    pose_array_message(np.ones((3, 3)), 1.0).serialize(buffer)
+    assert cloud_places(buffer.getvalue()).tolist() == [[1.0, 1.0]] * 3
+    with pytest.raises(ValueError, match="."):
+        cloud_places(buffer.getvalue()[:cut])
 
 
 LEG = Leg(0, 1, Goal(1.0, 2.0), True, "", 1, 70.0)

@@ -13,6 +13,7 @@ import pytest
 from browser import ROOT
 from driver import Driver
 from playwright.sync_api import expect
+from test_looks import violations
 
 # The first flight after a change of the kernels compiles them.
 pytestmark = pytest.mark.timeout(300)
@@ -90,7 +91,8 @@ def test_a_flight_by_keyboard_alone(serve, open_page, goals, recording):
 def test_a_robot_is_told_where_it_is_and_searches_the_whole_map(serve, open_page, goals):
     """By a drag, by keyboard, and by its scans alone; quad0 hovers at its start."""
     options = ["--web", "--localization", "amcl", "--goals", str(goals)]
-    flight = Driver(open_page(serve(command=[*QUAD, "fly", *options]).url)).is_ready()
+    served = serve(command=[*QUAD, "fly", *options])
+    flight = Driver(open_page(served.url)).is_ready()
     state = flight.at("flight-state")
     expect(state).to_have_text("running", timeout=120000)
     flight.page.keyboard.press(".")
@@ -119,6 +121,9 @@ def test_a_robot_is_told_where_it_is_and_searches_the_whole_map(serve, open_page
     xs = "arena.fleet.localizations[0].points.filter((_, i) => i % 2 === 0)"
     flight.wait_for_arena(f"Math.max(...{xs}) - Math.min(...{xs}) > 8")
     expect(flight.at("robots-row-0")).to_contain_text("lost")
+    dark = Driver(open_page(served.url, color_scheme="dark")).is_ready()
+    dark.select(0)
+    assert [violations(one.page) for one in (flight, dark)] == [[], []]
 
 
 def believed_near(x_m, y_m):

@@ -2,7 +2,7 @@
  * What both views draw: one plain object for each thing, made from the items of the store.
  */
 
-import { INK, seen } from "./colours.js";
+import { INK, mix, seen } from "./colours.js";
 
 /** Layers that the server sends on request, as in `view/state.py`. */
 export const STREAMED_LAYERS = [
@@ -135,7 +135,7 @@ function tracksOf(store, colourOf, { selected }) {
 function localizationsOf(store, colourOf) {
   return store.all("localization").map(({ robot, data, arrays: { pose, points } }) => {
     const [x, y, yaw, ...variances] = pose.values;
-    const colour = data.is_lost ? INK.fault : colourOf(robot);
+    const colour = data.is_lost ? INK.fault : mix(colourOf(robot), INK.strong, 0.45);
     return { robot, colour, x, y, yaw, variances, points: points.values, isLost: data.is_lost };
   });
 }

@@ -121,12 +121,12 @@ export class MapView {
     drawObstacles(context, viewport, fleet.obstacles, fleet.altitude);
     drawCells(context, viewport, fleet.cells);
     drawTracks(context, toScreen, fleet.tracks);
-    drawLocalizations(context, toScreen, fleet.localizations);
     drawPaths(context, viewport, fleet);
     drawGoals(context, toScreen, fleet.goals, fleet.selected !== null);
     drawScans(context, viewport, fleet.scans);
     drawYields(context, toScreen, fleet.yields, (robot) => this.reachOf(robot));
     this._drawRobots(context, fleet, labels);
+    drawLocalizations(context, toScreen, fleet.localizations);
     drawContacts(context, toScreen, fleet.contacts);
   }
 

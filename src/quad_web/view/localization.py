@@ -15,7 +15,7 @@ from quad_web.view.state import Item
 GIVEN_COVARIANCE: NDArray[np.float64] = np.diag([0.25, 0.25, (math.pi / 12.0) ** 2])
 """Of a pose that a person gives: that of RViz's "2D Pose Estimate"."""
 SEARCHES = "searches the whole map"
-LOST = "its localization is lost"
+LOST = "its localisation is lost"
 _MOST_PARTICLES = 250
 
 
@@ -49,20 +49,17 @@ class Located:
         return Item(f"localization/{robot}", {"is_lost": self.is_lost}, arrays)
 
     def row(self) -> Dict[str, Any]:
-        """Return the numbers for the item ``status``; None if they are not known."""
-        numbers = {"yaw": None, "deviation_m": math.sqrt(max(0.0, self._variance_m2))}
+        """Return the numbers for the item ``status``, without those that are not known."""
+        variance_m2 = float(np.trace(self.covariance[:2, :2]))
+        numbers = {"deviation_m": math.sqrt(variance_m2) if variance_m2 >= 0.0 else math.nan}
         if self.pose is not None:
             numbers["yaw"] = self.pose.yaw_rad
         if self.pose is not None and self.truth is not None:
             numbers["error_m"] = self.pose.distance_to(self.truth)
             turn_rad = angle_difference(self.pose.yaw_rad, self.truth.yaw_rad)
             numbers["error_rad"] = abs(float(turn_rad))
-        known = {k: v for k, v in numbers.items() if v is not None and math.isfinite(v)}
+        known = {name: value for name, value in numbers.items() if math.isfinite(value)}
         return {"is_lost": self.is_lost, "searches": self.searches, **known}
-
-    @property
-    def _variance_m2(self) -> float:
-        return float(np.trace(self.covariance[:2, :2]))
 
 
 def given_text(pose: Pose2D) -> str:
