@@ -16,8 +16,8 @@ from std_msgs.msg import String
 
 from quad_localization.ros.map_messages import grid_from_message
 from quad_nav.files.shipped import shipped
-from quad_nav.geometry import Pose2D
 from quad_nav.grid import GridSpec
+from quad_nav.ros.common.conversions import pose_from_message
 from quad_nav.scenario.scene_map import scene_occupancy
 from quad_nav.sim.scene_file import load_scene
 from quad_web.ros.actions import FlightActions
@@ -50,7 +50,7 @@ class LocalizedFlight(FlightCase):
 
     def check_page(self, name, poses):
         """The page shows the result and who is where, and takes a pose for a robot that hovers."""
-        state, place = FleetState(), Pose2D(*self.position(0), 0.0)
+        state, here = FleetState(), pose_from_message(poses.messages[-1].pose.pose).to_2d()
         state.add_client(Wanted(frozenset(LAYERS), 0))
         source = FlightSource(state, 2, "test")
         actions = FlightActions(source, 2, Path("/nonexistent"))
@@ -65,7 +65,7 @@ class LocalizedFlight(FlightCase):
         self.wait(lambda: state.item("localization/0"), "where robot 0 believes itself")
         self.wait(lambda: state.item("status").data["rows"][0]["localization"], "its figures")
         count = len(poses.messages)
-        answer = actions.call("set_pose", 0, place)
+        answer = actions.call("set_pose", 0, here)
         self.assertTrue(answer.ok, answer.text)
         self.wait(lambda: len(poses.messages) > count, "a pose after that of a person")
         if name != "amcl":

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The page of a flight of ROS nodes in chromium: see it, send a goal, stop all, a result, a killed node."""
+"""A flight of ROS nodes on the page in chromium: goal, stop all, result, a killed node."""
 
 import json
 import re
