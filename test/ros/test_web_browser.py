@@ -52,6 +52,7 @@ class WebBrowser(FlightCase):
 
     def restart_node(self):
         """Kill the node, and have it restarted once the page has noticed."""
+        self.wait(lambda: pid_of("/web"), "the node's own address after the last restart")
         node = psutil.Process(pid_of("/web"))
         supervisor = node.parent()
         supervisor.suspend()  # or the node could be back before the page is looked at
