@@ -139,10 +139,8 @@ class FlightItems:
         poses = poses_item(flight.now_s, time.time(), flight.states.bodies.rows)
         movers = flight.simulation.movers
         moving = movers.poses(flight.now_s)
-        cycles_s = np.full(len(self._names), np.nan)
-        for view in views:
-            if view.cycle_wall_s is not None:
-                cycles_s[view.robot] = view.cycle_wall_s
+        known_s = {v.robot: v.cycle_wall_s for v in views if v.cycle_wall_s is not None}
+        cycles_s = np.array([known_s.get(robot, np.nan) for robot in self._robots])
         samples = rows.samples_item(
             flight.now_s,
             poses.arrays["pose"],
