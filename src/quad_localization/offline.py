@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Dict, List
+from typing import Any, Dict, List, Optional
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.scenario.scene_map import scene_map
-from quad_nav.sim.localization import believed_states
+from quad_nav.sim.localization import Estimate, believed_states
 from quad_nav.sim.scene import Scene
 
 
@@ -39,11 +39,29 @@ class SlamLocalization:
     def map_from_odom(self, robot: int) -> Pose2D:
         """Return where a robot's odometry frame is."""
         place = self.slam.poses.get(robot)
-        return Pose2D(0.0, 0.0) if place is None else place.map_from_odom
+        return self.slam.frames[robot] if place is None else place.map_from_odom
 
     def is_lost(self, robot: int) -> bool:
         """Return whether a robot does not know its place."""
         return robot not in self.slam.poses or self.slam.poses[robot].is_lost
+
+    def estimate(self, robot: int) -> Optional[Estimate]:
+        """Return where a robot believed itself at its last scan."""
+        place = self.slam.poses.get(robot)
+        if place is None or place.odom_from_base is None:
+            return None
+        return place.map_from_odom.compose(place.odom_from_base), place.covariance
+
+    def particles(self, robot: int) -> None:
+        """Return None: there are no particles."""
+
+    def set_pose(self, robot: int, pose: Pose2D, covariance: NDArray[np.float64]) -> None:
+        """Tell a robot roughly where it is; the covariance is that of the start."""
+        self.slam.set_pose(robot, pose)
+
+    def set_uniform(self, robot: int) -> bool:
+        """Return False: a map that grows cannot be searched as a whole."""
+        return False
 
 
 class AmclLocalization:
@@ -95,6 +113,24 @@ class AmclLocalization:
     def is_lost(self, robot: int) -> bool:
         """Return whether a robot does not know its place, so that it has to hover."""
         return self.amcls[robot].estimate is None or self.amcls[robot].is_lost
+
+    def estimate(self, robot: int) -> Optional[Estimate]:
+        """Return where a robot believed itself at its last scan."""
+        last = self._amcls[robot].estimate
+        return None if last is None else (self._place(robot), last.covariance)
+
+    def particles(self, robot: int) -> Optional[NDArray[np.float64]]:
+        """Return the particles."""
+        particles = self._amcls[robot].particles
+        return None if particles is None else particles.poses
+
+    def set_pose(self, robot: int, pose: Pose2D, covariance: NDArray[np.float64]) -> None:
+        """Tell a robot where it is."""
+        self._amcls[robot].set_pose(PoseEstimate(pose, covariance))
+
+    def set_uniform(self, robot: int) -> bool:
+        """Let a robot search the whole map."""
+        return self._amcls[robot].set_uniform()
 
 
 MAKERS = {"amcl": AmclLocalization, "slam": SlamLocalization}

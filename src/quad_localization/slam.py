@@ -94,12 +94,13 @@ class Slam:
 
     Attributes:
         map: The map.
+        frames: Roughly the odometry frames in ``map``, of robots without a place.
         poses: The robots' places by number, after their first scans.
     """
 
     def __init__(self, frames: Dict[int, Pose2D], params: SlamParams = SlamParams()) -> None:
-        """Start with an empty map; ``frames`` are roughly the odometry frames in ``map``."""
-        self._params, self._frames = params, frames
+        """Start with an empty map."""
+        self._params, self.frames = params, frames
         self.map = GrowingMap(params.resolution_m)
         self.poses: Dict[int, SlamPose] = {}
 
@@ -139,7 +140,7 @@ class Slam:
         """Tell where a robot roughly is, as a person sees it; its next scan finds the place."""
         place = self.poses.pop(robot, None)
         if place is not None and place.odom_from_base is not None:
-            self._frames[robot] = map_from_base.compose(place.odom_from_base.inverse())
+            self.frames[robot] = map_from_base.compose(place.odom_from_base.inverse())
 
     def _points(self, robot: int, scan: Scan, odom_from_lidar: Pose3D) -> Floats:
         """Return the ends of beams float64[n, 2] in the odometry frame, without those on peers."""
@@ -159,7 +160,7 @@ class Slam:
         """Return a robot's place by odometry alone, its covariance grown by the way."""
         params, place = self._params, self.poses.get(robot)
         if place is None or place.odom_from_base is None:
-            map_from_odom = self._frames[robot]
+            map_from_odom = self.frames[robot]
             deviations = params.start_m, params.start_m, params.start_rad
             place = SlamPose(map_from_odom, np.diag(np.square(deviations)))
         else:

@@ -28,6 +28,7 @@ SHOWN = {
     "local_costmap": "Local costmap",
     "cell": "Voronoi cells",
     "track": "Tracked obstacles",
+    "localization": "Localisation",
     "goals": "Goals",
     "yields": "Yields",
     "contacts": "Contacts",
@@ -72,7 +73,7 @@ class BrowserView(
 
 
 class Arena(BrowserView):
-    """The arena; its events are "select", "goal", "edit", "tool", "mode" and "follow".
+    """The arena; its events are "select", "goal", "pose", "edit", "tool", "mode" and "follow".
 
     A page that only watches has the tool "view" alone.
     """

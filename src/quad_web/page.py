@@ -4,8 +4,8 @@ On a wide screen the arena is in the middle, robots and the two editors are besi
 events and diagnostics below. On a phone the arena is on top, the panels are behind tabs, and the
 button that stops every robot stays at the bottom.
 
-``data-testid``: ``tool-view``, ``tool-goal``, ``mode`` (2D, 3D), ``layers`` (its menu
-has ``layer-<name>``), ``side-<panel>``, ``dock-<panel>`` and ``phone-<panel>`` (tabs), and
+``data-testid``: ``tool-view``, ``tool-goal``, ``tool-pose``, ``mode`` (2D, 3D), ``layers`` (its
+menu has ``layer-<name>``), ``side-<panel>``, ``dock-<panel>`` and ``phone-<panel>`` (tabs), and
 ``panel-<panel>``. Those of the panels are in their modules.
 """
 
@@ -105,6 +105,7 @@ class Page:
         self.arena = Arena(role)
         self.arena.on("select", lambda event: self.client.select(event.args))
         self.arena.on("goal", lambda event: self.card.send(*goal_pose(event.args)))
+        self.arena.on("pose", lambda event: self.card.set_pose(*goal_pose(event.args)))
         self.arena.on("edit", lambda event: self.goals.take(edited_goals(event.args)))
         self.arena.on("tool", lambda event: self.set_tool(event.args))
         self.arena.on("mode", lambda event: self._mode.set_value(event.args))
@@ -119,9 +120,11 @@ class Page:
                     for tool, icon, title in (
                         ("view", "near_me", "Select"),
                         ("goal", "add_location_alt", "Send goal"),
+                        ("pose", "pin_drop", "2D pose estimate"),
                     )
                 }
                 enable(self._tools["goal"], self.client, "send_goal")
+                enable(self._tools["pose"], self.client, "set_pose")
             with ui.element("div").classes("group"):
                 options = {"2d": "2D", "3d": "3D"}
                 self._mode: Any = ui.toggle(options, value="2d")
@@ -190,6 +193,8 @@ class Page:
         shown = (self.bar, self.result, self.table, self.card, self.events, self.diagnostics)
         for panel in shown:
             panel.refresh()
+        for element in (self._tools["pose"], self._switches["localization"]):
+            element.set_visibility(self.client.has_localization)
         problems = self.diagnostics.problems
         for place in ("dock", "phone"):
             classes = {"add": "has-problems"} if problems else {"remove": "has-problems"}
@@ -237,7 +242,7 @@ class Page:
     # -- what it does ----------------------------------------------------------------
 
     def set_tool(self, tool: str) -> None:
-        """Choose what the mouse does in the arena: "view", "goal" or "edit"."""
+        """Choose what the mouse does in the arena: "view", "goal", "pose" or "edit"."""
         if self.client.role is not Role.STEER:
             tool = "view"
         if tool != "view":

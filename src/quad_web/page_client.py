@@ -133,6 +133,11 @@ class PageClient:
         """Return a robot's row, None without one."""
         return next((row for row in self.rows() if row["robot"] == robot), None)
 
+    @property
+    def has_localization(self) -> bool:
+        """Whether a localization runs."""
+        return any(row.get("localization") for row in self.rows())
+
     def name(self, robot: Optional[int]) -> str:
         """Return a robot's name."""
         names = self.data("robots").get("names", ())

@@ -2,7 +2,7 @@
 
 ``data-testid``: ``robots`` (rows ``robots-row-<number>``); ``card``, ``card-name``, ``card-state``,
 ``card-facts``, ``goal-tool``, ``goal-x``, ``goal-y``, ``goal-yaw``, ``goal-send``, ``goal-fault``,
-``cancel``, ``clear-costmaps``, ``lidar``, ``deselect``.
+``pose-set``, ``cancel``, ``clear-costmaps``, ``lidar``, ``search``, ``deselect``.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from quad_web.page_client import PageClient
 from quad_web.view.state import FleetState
 
 _HINT = "Click one in the table or in the arena. A goal goes to the nearest one."
+_FACTS = ("position", "heading", "speed", "goal", "gap", "recoveries left")
+_LOCALIZATION = "localisation"
 _STEP_S = 0.5  # ages below are shown as one, so that an idle row does not change
 
 _COLUMNS = [
@@ -167,12 +169,13 @@ class RobotCard:
     def _make_facts(self) -> None:
         self._values: Dict[str, ui.label] = {}
         with self._facts:
-            for name in ("position", "heading", "speed", "goal", "gap", "recoveries left"):
-                with ui.element("div"):
+            for name in (*_FACTS, _LOCALIZATION):
+                with ui.element("div") as self._located:  # the last one is that of localization
                     with ui.element("dt"):
                         ui.label(name)
                     with ui.element("dd"):
                         self._values[name] = ui.label("–")
+            self._located.classes("wide")
 
     def _make_actions(self) -> None:
         client = self._client
@@ -185,10 +188,14 @@ class RobotCard:
             self._lidar = ui.switch("LIDAR").props("dense data-testid=lidar")
             self._lidar.on("update:model-value", self._switch_lidar)
             self._lidar_shown: Optional[Tuple[int, bool]] = None
+            search = self._call("set_uniform")
+            self._search = ui.button("Global localisation", icon="travel_explore", on_click=search)
+            self._search.props("outline dense no-caps data-testid=search")
             self._controls = (
                 (self._cancel, "cancel"),
                 (self._clear, "clear_costmaps"),
                 (self._lidar, "enable_lidar"),
+                (self._search, "set_uniform"),
             )
             for element, name in self._controls:
                 enable(element, client, name)
@@ -205,6 +212,9 @@ class RobotCard:
             ]
             send = ui.button("Send", on_click=self._send_typed)
             send.props("unelevated dense no-caps data-testid=goal-send")
+            self._set = ui.button("Set pose", on_click=lambda: self._take_typed(self.set_pose))
+            self._set.props("outline dense no-caps data-testid=pose-set")
+            enable(self._set, client, "set_pose")
             for field in self._fields:
                 field.on("keydown.enter", self._send_typed)
             for element in (tool, *self._fields, send):
@@ -229,9 +239,17 @@ class RobotCard:
         self._reason.set_visibility(bool(self._reason.text))
         for element, name in self._controls:
             element.set_enabled(row is not None and not why_idle(client, name))
+        self._show_localization((row or {}).get("localization") or {})
         if row is not None and robot is not None:
             self._show_facts(row, robot)
             self._show_lidar(robot, bool(row.get("lidar", True)))
+
+    def _show_localization(self, located: Mapping[str, Any]) -> None:
+        """Show the controls and the figures of a localization, if one runs."""
+        self._located.set_visibility(bool(located))
+        self._set.set_visibility(bool(located))
+        self._search.set_visibility(bool(located.get("searches")))
+        self._values[_LOCALIZATION].text = localization_text(located)
 
     def _show_lidar(self, robot: int, is_on: bool) -> None:
         """Set the switch when the state changes: after a click the row is old for a moment."""
@@ -274,10 +292,13 @@ class RobotCard:
             self._lidar.value = not is_on
 
     async def _send_typed(self) -> None:
+        await self._take_typed(self.send)
+
+    async def _take_typed(self, take: Callable[..., Any]) -> None:
         entry: List[Any] = [typed_number(field.value) for field in self._fields]
         self._fault.text = entry_fault(entry)
         if not self._fault.text:
-            await self.send(*entry)
+            await take(*entry)
 
     async def send(self, x_m: float, y_m: float, yaw_rad: Optional[float]) -> None:
         """Send the selected robot, without one the nearest, to a pose in ``map``."""
@@ -285,10 +306,31 @@ class RobotCard:
         pose = goal_pose(self._client.state, robot, x_m, y_m, yaw_rad)
         await self._client.call("send_goal", robot, pose, robot=robot)
 
+    async def set_pose(self, x_m: float, y_m: float, yaw_rad: Optional[float]) -> None:
+        """Tell the selected robot where it is; without a yaw it looks as it believes."""
+        robot = self._client.selected
+        if robot is not None:
+            located = (self._client.row(robot) or {}).get("localization") or {}
+            yaw_rad = located.get("yaw", 0.0) if yaw_rad is None else yaw_rad
+            pose = Pose2D(x_m, y_m, yaw_rad)
+            await self._client.call("set_pose", robot, pose, robot=robot)
+
 
 def with_unit(value: Optional[float], unit: str) -> str:
     """Return a quantity for people."""
     return "–" if value is None else f"{value:.2f} {unit}"
+
+
+def localization_text(located: Mapping[str, Any]) -> str:
+    """Return how well a robot knows its place."""
+    deviation_m, error_m = located.get("deviation_m"), located.get("error_m")
+    parts = ["lost"] if located.get("is_lost") else []
+    if deviation_m is not None:
+        parts.append(f"±{deviation_m:.2f} m")
+    if error_m is not None:
+        turned = math.degrees(located["error_rad"])
+        parts.append(f"{error_m:.2f} m, {turned:.0f}° from the truth")
+    return "; ".join(parts) or "–"
 
 
 def _goal_text(goal: Optional[str], distance_m: Optional[float]) -> str:

@@ -107,3 +107,31 @@ def test_the_configuration_changes_the_default_where_poses_err():
     assert localized.local_planner == default.local_planner
     report = CliRunner().invoke(main, ["check", "localized"])
     assert report.exit_code == 0, report.output
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_a_person_tells_a_robot_where_it_is(name):
+    """The pose that was given is in force with the next scan; only amcl searches the whole map."""
+    options = FlightOptions(None, shipped("goals"), localization=MAKERS[name], robots=1)
+    loop = FlightLoop(offline_setup(read_setup(options)), [(0,)])
+    localization = loop.group.localization
+    assert localization.estimate(0) is None
+    loop.start()
+    truth, (believed, covariance) = loop.states[0].map_from_base, localization.estimate(0)
+    assert believed.distance_to(truth.to_2d()) < 0.1
+    assert np.all(np.linalg.eigvalsh(covariance) > 0.0)
+    wrong = Pose2D(believed.x_m + 0.5, believed.y_m, believed.yaw_rad)
+    localization.set_pose(0, wrong, np.diag([1e-6, 1e-6, 1e-6]))
+    loop.advance(loop.setup.steps_per_scan)
+    loop.advance(loop.setup.steps_per_scan)
+    moved, covariance = localization.estimate(0)
+    particles = localization.particles(0)
+    if name == "amcl":
+        assert moved.distance_to(wrong) < 0.05
+        assert np.hypot(*(particles[:, :2] - (wrong.x_m, wrong.y_m)).T).max() < 0.1
+    assert localization.set_uniform(0) == (name == "amcl")
+    if name == "amcl":
+        assert np.ptp(localization.particles(0)[:, 0]) > 5.0
+    else:
+        assert particles is None
+    loop.close()

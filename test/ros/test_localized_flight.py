@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """The tutorial's mission without a perfect pose: `localization:=amcl`, and `slam` without a map."""
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import rospy
@@ -10,11 +12,16 @@ import tf2_ros
 from flight_case import FlightCase, Record
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
+from std_msgs.msg import String
 
 from quad_localization.ros.map_saver import map_from_message
 from quad_nav.files.shipped import shipped
+from quad_nav.ros.common.conversions import pose_from_message
 from quad_nav.scenario.scene_map import scene_occupancy
 from quad_nav.sim.scene_file import load_scene
+from quad_web.ros.actions import FlightActions
+from quad_web.ros.source import FlightSource
+from quad_web.view.state import LAYERS, FleetState, Wanted
 
 
 class LocalizedFlight(FlightCase):
@@ -23,6 +30,7 @@ class LocalizedFlight(FlightCase):
         self.listener = tf2_ros.TransformListener(buffer)
         name = rospy.get_param("~localization")
         poses = [Record(f"/{name}_pose{i}", PoseWithCovarianceStamped) for i in (0, 1)]
+        summaries = Record("/quad/summary", String)
         maps = Record("/map", OccupancyGrid)
         result = self.read_result(rospy.get_param("~result"), patience_s=380.0)
         goals = [goal for robot in result["robots"] for goal in robot["goals"]]
@@ -34,7 +42,42 @@ class LocalizedFlight(FlightCase):
             self.assertGreater(drift_m, 0.1, "odometry has drifted, and somebody corrects it")
             self.assertAlmostEqual(frame.translation.z, 0.0)
             self.assertGreater(len(poses[i].messages), 50)
+        self.wait(lambda: summaries.messages[-1].data, "the summary")
+        self.assertEqual(json.loads(summaries.messages[-1].data), result)
+        self.listener.unregister()  # the page reads /tf in a form of its own
+        self.check_page(name, poses[0])
         self.check_map(map_from_message(maps.messages[-1]))
+
+    def check_page(self, name, poses):
+        """The page shows the result and who is where, and takes a pose for a robot that hovers."""
+        state, here = FleetState(), pose_from_message(poses.messages[-1].pose.pose).to_2d()
+        state.add_client(Wanted(frozenset(LAYERS), 0))
+        source = FlightSource(state, 2, "test")
+        actions = FlightActions(source, 2, Path("/nonexistent"))
+        source.start()
+
+        def flight(key):
+            item = state.item("flight")
+            return item and item.data[key]
+
+        self.wait(lambda: flight("state") == "ended", lambda: flight("state"))
+        self.assertEqual(state.item("result").data["reached"], 6)
+        self.wait(lambda: state.item("localization/0"), "where robot 0 believes itself")
+        self.wait(lambda: state.item("status").data["rows"][0]["localization"], "its figures")
+        count = len(poses.messages)
+        answer = actions.call("set_pose", 0, here)
+        self.assertTrue(answer.ok, answer.text)
+        self.wait(lambda: len(poses.messages) > count, "a pose after that of a person")
+        if name != "amcl":
+            return
+        self.wait(lambda: len(state.item("localization/0").arrays["points"]) > 100, "particles")
+        answer = actions.call("set_uniform", 0)
+        self.assertTrue(answer.ok, answer.text)
+
+        def is_spread():
+            return any(one.pose.covariance[0] > 1.0 for one in poses.messages[count:])
+
+        self.wait(is_spread, "particles all over the map")
 
     def check_map(self, grid):
         """The occupied cells are on the scene's surfaces, to within two cells."""

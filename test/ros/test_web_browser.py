@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""The page of a flight of ROS nodes in chromium: see it, send a goal, stop all, a killed node."""
+"""A flight of ROS nodes on the page in chromium: goal, stop all, result, a killed node."""
 
+import json
 import re
 import sys
 from pathlib import Path
@@ -10,6 +11,11 @@ import rospy
 import rostest
 from flight_case import FlightCase, pid_of, trigger
 from playwright.sync_api import expect
+from std_msgs.msg import String
+
+from quad_nav.mission.flight_log import Leg
+from quad_nav.mission.goal import Goal
+from quad_nav.mission.summary import MissionSummary, RobotSummary, to_json
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "test" / "web"))
@@ -46,6 +52,7 @@ class WebBrowser(FlightCase):
 
     def restart_node(self):
         """Kill the node, and have it restarted once the page has noticed."""
+        self.wait(lambda: pid_of("/web"), "the node's own address after the last restart")
         node = psutil.Process(pid_of("/web"))
         supervisor = node.parent()
         supervisor.suspend()  # or the node could be back before the page is looked at
@@ -95,14 +102,33 @@ class WebBrowser(FlightCase):
             row = self.driver.at(f"robots-row-{robot}")
             expect(row).to_contain_text("stopped")
 
-    def test_4_a_killed_node_is_noticed_and_the_page_comes_back(self):
+    def test_4_a_mission_that_has_ended_shows_its_result(self):
+        """The sequencer's flies in rounds: its summary is made up."""
+        legs = tuple(Leg(k, 1, Goal(1.0, 2.0), True, "", 1, 70.0) for k in (0, 1))
+        robot = RobotSummary("quad0", legs, 9.0, 0.41, 1.54)
+        summary = to_json(MissionSummary((robot,), sim_time_s=70.0, wall_time_s=5.0))
+        topic = rospy.Publisher("/quad/summary", String, queue_size=1, latch=True)
+        topic.publish(json.dumps(summary))
+        self.driver.at("play").click()  # resumes what the last test has stopped
+        expect(self.driver.at("flight-state")).to_have_text("ended")
+        card = self.driver.at("result")
+        for text in ("Mission succeeded", "2 of 2", "70.0 s", "0.41 m", "1.54 m"):
+            expect(card).to_contain_text(text)
+        self.assertEqual(self.driver.at("result-report").count(), 0)
+        url = f"http://127.0.0.1:{rospy.get_param('/web/port')}/summary.json"
+        self.assertEqual(self.context.request.get(url).json(), summary)
+        topic.publish("")
+        expect(card).to_be_hidden()
+        expect(self.driver.at("flight-state")).to_have_text("running")
+
+    def test_5_a_killed_node_is_noticed_and_the_page_comes_back(self):
         self.watch.forgive(GONE)
         self.restart_node()
         expect(self.driver.page.locator(NOTICE)).to_be_hidden()
         expect(self.driver.rows()).to_have_count(2)
         self.driver.is_ready()
 
-    def test_5_a_page_with_an_old_token_says_what_to_do(self):
+    def test_6_a_page_with_an_old_token_says_what_to_do(self):
         rospy.set_param("/web/steer_token", "the-second-to-steer")
         self.restart_node()
         notice = self.driver.page.locator(NOTICE)

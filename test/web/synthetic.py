@@ -23,7 +23,7 @@ from quad_nav.geometry import Pose2D, Pose3D, Twist2D, quaternion_from_euler
 from quad_nav.grid import GridSpec
 from quad_nav.mission.flight_log import Leg
 from quad_nav.mission.goal import Goal
-from quad_nav.mission.summary import MissionSummary, RobotSummary
+from quad_nav.mission.summary import MissionSummary, RobotSummary, to_json
 from quad_nav.peers.right_of_way import Yield, YieldDecision
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.motion import Motion, Walkers
@@ -118,7 +118,7 @@ class SyntheticFleet:
         robot = RobotSummary("robot0", tuple(legs), 9.0, 0.41, 1.54)
         summary = MissionSummary((robot,), sim_time_s=70.0, wall_time_s=5.0)
         self.flight_state = "ended"
-        self.state.put_all([result_item(summary, None)])
+        self.state.put_all([result_item(to_json(summary), "quad report")])
 
     def stop(self) -> None:
         self._ended.set()

@@ -13,6 +13,7 @@ import pytest
 from browser import ROOT
 from driver import Driver
 from playwright.sync_api import expect
+from test_looks import violations
 
 # The first flight after a change of the kernels compiles them.
 pytestmark = pytest.mark.timeout(300)
@@ -85,6 +86,49 @@ def test_a_flight_by_keyboard_alone(serve, open_page, goals, recording):
     press("Enter")
     expect(state).to_have_text("running")
     expect(flight.at("robots-row-1")).not_to_contain_text("stopped")
+
+
+def test_a_robot_is_told_where_it_is_and_searches_the_whole_map(serve, open_page, goals):
+    """By a drag, by keyboard, and by its scans alone; quad0 hovers at its start."""
+    options = ["--web", "--localization", "amcl", "--goals", str(goals)]
+    served = serve(command=[*QUAD, "fly", *options])
+    flight = Driver(open_page(served.url)).is_ready()
+    state = flight.at("flight-state")
+    expect(state).to_have_text("running", timeout=120000)
+    flight.page.keyboard.press(".")
+    expect(state).to_have_text("stopped")
+    flight.select(0)
+    flight.wait_for_arena("arena.fleet.localizations[0].points.length > 200")
+    expect(flight.at("card-facts")).to_contain_text("from the truth")
+    here = flight.arena("fleet.robots[0]")
+    flight.use_goal_tool("tool-pose")
+    flight.fit()
+    flight.drag_arena((4.0, 4.0), (4.0, 5.0))
+    flight.says("quad0: pose set to (4.00, 4.00), 90°")
+    flight.wait_for_arena(believed_near(4.0, 4.0))
+    flight.page.keyboard.press("Escape")
+    for name, value in (("x", here["x"]), ("y", here["y"]), ("yaw", here["yaw"])):
+        flight.at(f"goal-{name}").fill(f"{value:.2f}")
+    flight.tab_to("[data-testid=pose-set]")
+    flight.page.keyboard.press("Enter")
+    flight.wait_for_arena(believed_near(here["x"], here["y"]))
+    flight.at("play").click()  # resumes
+    expect(state).to_have_text("running")
+    flight.at("play").click()
+    expect(state).to_have_text("paused")
+    flight.at("search").click()
+    flight.says("quad0: searches the whole map")
+    xs = "arena.fleet.localizations[0].points.filter((_, i) => i % 2 === 0)"
+    flight.wait_for_arena(f"Math.max(...{xs}) - Math.min(...{xs}) > 8")
+    expect(flight.at("robots-row-0")).to_contain_text("lost")
+    dark = Driver(open_page(served.url, color_scheme="dark")).is_ready()
+    dark.select(0)
+    assert [violations(one.page) for one in (flight, dark)] == [[], []]
+
+
+def believed_near(x_m, y_m):
+    """Return the condition that robot 0 believes itself near a place."""
+    return f"(({{x, y}}) => Math.hypot(x - {x_m}, y - {y_m}) < 1)(arena.fleet.localizations[0])"
 
 
 def test_a_flight_that_has_ended_shows_its_result_and_its_closest_moments(

@@ -5,15 +5,19 @@ Bodies and LIDARs stay where they are; navigators get what the robots believe.
 
 from __future__ import annotations
 
-from typing import Callable, Optional, Protocol
+from typing import Callable, Optional, Protocol, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D, Pose3D, Scan, multiply_quaternions, quaternion_from_yaw
 from quad_nav.sim.flight import BodyState
 from quad_nav.sim.odometry import OdomFrames
 from quad_nav.sim.robot_state import RobotStates
 from quad_nav.sim.scene import Scene
+
+Estimate = Tuple[Pose2D, NDArray[np.float64]]
+"""A pose in ``map``, and its covariance float64[3, 3] of x, y in metres and yaw in radians."""
 
 
 class Localization(Protocol):
@@ -29,6 +33,18 @@ class Localization(Protocol):
 
     def is_lost(self, robot: int) -> bool:
         """Return whether a robot does not know its place."""
+
+    def estimate(self, robot: int) -> Optional[Estimate]:
+        """Return where a robot believed itself at its last scan; None before the first one."""
+
+    def particles(self, robot: int) -> Optional[NDArray[np.float64]]:
+        """Return particles float64[n, 3], poses in ``map``; None if the method has none."""
+
+    def set_pose(self, robot: int, pose: Pose2D, covariance: NDArray[np.float64]) -> None:
+        """Tell a robot where it is in ``map``, as a person sees it; its next scan counts."""
+
+    def set_uniform(self, robot: int) -> bool:
+        """Let a robot search the whole map; return False if the method cannot."""
 
 
 LocalizationMaker = Callable[[Scene, int], Localization]

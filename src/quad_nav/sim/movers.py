@@ -149,26 +149,39 @@ class Movers:
 
         Arguments and result are as for ``flight_surface_distances_m``.
         """
-        nearest = np.full(positions_m.shape[:-1], np.inf)
-        poses = self.poses_at(times_s)
-        for k, shape in enumerate(self.shapes):
-            touchable = self._scene.touchable([shape.placed((0.0, 0.0, 0.0))])
-            if not touchable:
-                continue
-            x_m, y_m, yaw_rad = poses[:, k].T
-            local = rotate_vectors(
-                np.cos(yaw_rad),
-                -np.sin(yaw_rad),
-                positions_m[..., 0] - x_m,
-                positions_m[..., 1] - y_m,
-            )
-            own = touchable[0].surface_distance_m(*local, self._scene.altitude_m)
-            np.fmin(nearest, own, out=nearest)  # nobody knows where NaN is
-        return nearest
+        return moving_distances_m(self._scene, self.poses_at(times_s), positions_m)
 
     def at(self, now_s: float) -> List[Obstacle]:
         """Return the obstacles where they are at a time, without those of which it is unknown."""
         return self._scene.moving_solids(self.poses(now_s))
+
+
+def moving_distances_m(scene: Scene, poses: Floats, positions_m: Floats) -> Floats:
+    """Return the distances to the surface of the nearest obstacle that moves.
+
+    Args:
+        scene: The scene.
+        poses: float64[t, m, 3], x, y, yaw in ``map`` of ``Scene.moving_shapes``; NaN if unknown.
+        positions_m: float64[..., t, 2], positions in ``map`` at the flying altitude.
+
+    Returns:
+        float64[..., t], metres; negative inside, infinity without obstacles.
+    """
+    nearest = np.full(positions_m.shape[:-1], np.inf)
+    for k, shape in enumerate(scene.moving_shapes):
+        touchable = scene.touchable([shape.placed((0.0, 0.0, 0.0))])
+        if not touchable:
+            continue
+        x_m, y_m, yaw_rad = poses[:, k].T
+        local = rotate_vectors(
+            np.cos(yaw_rad),
+            -np.sin(yaw_rad),
+            positions_m[..., 0] - x_m,
+            positions_m[..., 1] - y_m,
+        )
+        own = touchable[0].surface_distance_m(*local, scene.altitude_m)
+        np.fmin(nearest, own, out=nearest)  # nobody knows where NaN is
+    return nearest
 
 
 def phases_s(motions: Sequence[Motion], common_s: Optional[float], seed: int) -> List[float]:

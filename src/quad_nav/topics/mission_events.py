@@ -12,6 +12,8 @@ from quad_nav.mission.actions import Action, Event, GoalEnded, Level, SendGoal, 
 from quad_nav.topics.validation import MAX_MAGNITUDE, shown_text
 
 EVENTS_TOPIC = "/quad/events"
+SUMMARY_TOPIC = "/quad/summary"
+"""How the mission has ended, the JSON object of ``mission.summary`` as text; "" before that."""
 
 
 @dataclass(frozen=True)

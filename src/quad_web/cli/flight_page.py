@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Callable, List, Optional
 
 from quad_nav.cli.options import echo
-from quad_nav.mission.summary import MissionSummary
+from quad_nav.mission.summary import MissionSummary, to_json
 from quad_nav.offline.flight import FlightObserver
 from quad_web.offline.actions import STARTED_AGAIN, FlightActions
 from quad_web.offline.view import WebView
@@ -16,6 +16,7 @@ from quad_web.process import Batch, ServerProcess
 from quad_web.server import Urls, WebOptions
 from quad_web.view.result import result_item
 
+_HINT = "quad fly --web --report FILE.html"
 _LOOKS_EVERY_S = 0.2
 _TAKES_WITHIN_S = 5.0
 
@@ -48,7 +49,7 @@ class FlightPage:
         while self._process.is_alive and not self._process.can_take and time.monotonic() < end_s:
             self._process.wait(_LOOKS_EVERY_S)
         if self._process.can_take:
-            self._process.send(Batch([result_item(summary, report)]))
+            self._process.send(Batch([result_item(to_json(summary), _HINT, report)]))
 
     def wants_flight(self, is_interrupted: Callable[[], bool]) -> bool:
         """Wait until people want another flight; false after Ctrl-C, or if the server has ended."""

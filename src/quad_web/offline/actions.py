@@ -13,11 +13,13 @@ from quad_nav.config.files import below
 from quad_nav.config.planners import planner_names
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.goal import MAX_COORDINATE_M
+from quad_nav.mission.goal import MAX_COORDINATE_M, goal_faults
 from quad_nav.offline.flight import Flight
 from quad_nav.scenario.goal_checks import place_check
+from quad_nav.sim.localization import Localization
 from quad_web.view.actions import FLIGHT_ACTIONS, Answer, GoalChange, ParameterView
 from quad_web.view.goal_files import GoalEditing, GoalFiles
+from quad_web.view.localization import GIVEN_COVARIANCE, SEARCHES, given_text
 
 STOPPED = "stopped by a person; Resume continues its mission"
 STARTED_AGAIN = "started again by a person"
@@ -176,6 +178,26 @@ class FlightActions(GoalEditing):
         self.flight.loop.enable_lidar(robot, is_on)
         self.lidars[robot] = is_on
         return self._did(robot, f"LIDAR switched {'on' if is_on else 'off'}")
+
+    def set_pose(self, robot: int, pose: Pose2D) -> Answer:
+        """Tell a robot where it is."""
+        faults = list(goal_faults([pose.x_m, pose.y_m, pose.yaw_rad]))
+        if faults:
+            raise InputError([f"pose{faults[0]}"])
+        self._localization(robot).set_pose(robot, pose, GIVEN_COVARIANCE)
+        return self._did(robot, given_text(pose))
+
+    def set_uniform(self, robot: int) -> Answer:
+        """Let a robot search the whole map."""
+        if not self._localization(robot).set_uniform(robot):
+            return Answer(False, f"{self._name(robot)}: its localization cannot search the map")
+        return self._did(robot, SEARCHES)
+
+    def _localization(self, robot: int) -> Localization:
+        name, found = self._name(robot), self.flight.loop.group.localization
+        if found is None:
+            raise InputError([f"{name}: knows its pose; quad fly --localization amcl estimates it"])
+        return found
 
     # -- parameters and goal files -------------------------------------------------------
 

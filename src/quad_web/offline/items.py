@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from typing import Dict, List, Optional, Sequence, Set, Tuple
+from dataclasses import replace
+from typing import Dict, List, Mapping, Optional, Sequence, Set, Tuple
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from quad_nav.loop.inspection import (
 )
 from quad_nav.offline.flight import Flight
 from quad_nav.sim.contacts import Contact
+from quad_nav.sim.localization import believed_states
 from quad_nav.topics.robot_topics import COLUMNS, RobotStatus
 from quad_nav.topics.tracked_obstacles import track_rows
 from quad_web.offline.actions import HAS_ENDED, STOPPED, FlightActions
@@ -37,6 +39,7 @@ from quad_web.view.items import (
     scene_item,
     track_item,
 )
+from quad_web.view.localization import LOST, Located
 from quad_web.view.state import Item, Wanted, robots_by_layer
 
 TRACK_PERIOD_S = 0.2
@@ -94,13 +97,15 @@ class FlightItems:
             items.append(rows.goals_item(self._goal_rows()))
         self._has_static = self._has_goals = True
         self._has_contacts = False
-        items += self._present_items(views, actions, rate)
+        located = self._located()
+        items += self._present_items(views, located, actions, rate)
         items += self._trails.items(sorted(robots_of["trail"]))
         radii_m = {v.robot: v.safety_radius_m for v in views if v.robot in robots_of["cell"]}
         positions = self._flight.states.poses[:, :2]
         passing = cell_items(self._flight.setup.scene, positions, radii_m)
         for view in views:
             passing += _navigator_items(view)
+        passing += [located[robot].item(robot) for robot in robots_of["localization"] if located]
         keys = {item.key for item in passing}
         removed, self._shown = tuple(self._shown - keys), keys
         return items + passing, removed
@@ -123,17 +128,19 @@ class FlightItems:
         ]
 
     def _present_items(
-        self, views: Sequence[NavigatorView], actions: FlightActions, rate: float
+        self,
+        views: Sequence[NavigatorView],
+        located: Mapping[int, Located],
+        actions: FlightActions,
+        rate: float,
     ) -> List[Item]:
         """Return what changes all the time, of all robots."""
         flight, setup = self._flight, self._flight.setup
         poses = poses_item(flight.now_s, time.time(), flight.states.bodies.rows)
         movers = flight.simulation.movers
         moving = movers.poses(flight.now_s)
-        cycles_s = np.full(len(self._names), np.nan)
-        for view in views:
-            if view.cycle_wall_s is not None:
-                cycles_s[view.robot] = view.cycle_wall_s
+        known_s = {v.robot: v.cycle_wall_s for v in views if v.cycle_wall_s is not None}
+        cycles_s = np.array([known_s.get(robot, np.nan) for robot in self._robots])
         samples = rows.samples_item(
             flight.now_s,
             poses.arrays["pose"],
@@ -142,7 +149,7 @@ class FlightItems:
             setup.scene.moving_solids(moving),
             cycles_s,
         )
-        now = {view.robot: self._robot_now(view, actions) for view in views}
+        now = {v.robot: self._robot_now(v, located.get(v.robot), actions) for v in views}
         status, yields = rows.fleet_items(now, self._names, samples)
         return [
             rows.flight_item(
@@ -161,23 +168,47 @@ class FlightItems:
             *([status] if views else []),
         ]
 
-    def _robot_now(self, view: NavigatorView, actions: FlightActions) -> rows.RobotNow:
+    def _located(self) -> Dict[int, Located]:
+        """Return where the robots believe themselves now; {} if they know it."""
+        localization, states = self._flight.loop.group.localization, self._flight.states
+        if localization is None:
+            return {}
+        found, believed = {}, believed_states(states, localization)
+        for robot in self._robots:
+            estimate, particles = localization.estimate(robot), localization.particles(robot)
+            found[robot] = Located(
+                is_lost=localization.is_lost(robot),
+                searches=particles is not None,
+                particles=particles,
+                truth=states[robot].map_from_base.to_2d(),
+            )
+            if estimate is not None:
+                pose = believed[robot].map_from_base.to_2d()
+                found[robot] = replace(found[robot], pose=pose, covariance=estimate[1])
+        return found
+
+    def _robot_now(
+        self, view: NavigatorView, located: Optional[Located], actions: FlightActions
+    ) -> rows.RobotNow:
         sequencer = self._flight.robots[view.robot].sequencer
         has_ended = actions.state == "ended"
+        is_lost = located is not None and located.is_lost
         return rows.RobotNow(
             view.state.value,
             view.decision,
             view.limited_by,
             is_done=sequencer.done,
             is_stopped=actions.is_stopped or view.stopped_reason != "",
+            is_lost=is_lost,
             has_ended=has_ended,
             goal=None if sequencer.done else sequencer.index + 1,
             goals=len(sequencer.sequence.goals),
             said=self._columns(view),
             recoveries=(view.recoveries_done, view.recoveries),
             lidar=actions.lidars[view.robot],
-            reason=view.stopped_reason
+            reason=(LOST if is_lost and not has_ended else view.stopped_reason)
             or (HAS_ENDED if has_ended else STOPPED if actions.is_stopped else ""),
+            localization=None if located is None else located.row(),
         )
 
     def _columns(self, view: NavigatorView) -> Dict[str, float]:

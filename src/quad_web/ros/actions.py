@@ -10,14 +10,16 @@ from typing import Any, Dict, List, Mapping, Optional
 
 import rospy
 from actionlib_msgs.msg import GoalID
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Header
 from std_srvs.srv import Empty, SetBool, SetBoolRequest, Trigger
 
-from quad_nav.geometry import Pose2D
+from quad_nav.geometry import Pose2D, covariance_36
 from quad_nav.mission.goal import goal_faults
 from quad_nav.mission.place_check import PlaceCheck
 from quad_nav.mission.robot_goals import goal_paths
+from quad_nav.ros.common.conversions import pose_message
 from quad_nav.ros.common.nav_messages import planar_pose, pose_stamped
 from quad_nav.ros.sequencer.mission_stop import RESUME_SERVICE, STOP_SERVICE, STOPPED_PARAMETER
 from quad_nav.scenario.goal_checks import place_check
@@ -28,6 +30,7 @@ from quad_web.ros.parameters import NavigatorParameters
 from quad_web.ros.source import FlightSource
 from quad_web.view.actions import FLIGHT_ACTIONS, Answer, ParameterView
 from quad_web.view.goal_files import GoalEditing, GoalFiles
+from quad_web.view.localization import GIVEN_COVARIANCE, SEARCHES, given_text
 
 _CONNECTS_WITHIN_S = 2.0
 _STOPS_WITHIN_S = 0.4  # then the goals are cancelled from here, whatever the sequencer does
@@ -49,6 +52,7 @@ class FlightActions(GoalEditing):
             rospy.Publisher(f"/move_base_simple/goal{i}", PoseStamped, queue_size=1)
             for i in self._robots
         ]
+        self._poses: Dict[int, rospy.Publisher] = {}
         self._parameters = NavigatorParameters(source.trees)
         files = {k: one.path for k, one in goal_paths(goals, robots)[0].items()}
         self._files = GoalFiles(files, self._check_of)
@@ -64,7 +68,9 @@ class FlightActions(GoalEditing):
             return Answer(False, str(error))
 
     def start(self) -> Answer:
-        """Start the simulation, and resume a mission that was stopped."""
+        """Start the simulation, resume a mission that was stopped, fly one that ended again."""
+        if self._source.flight_state == "ended":
+            return self.reset()
         texts = []
         if self._source.health.has_simulator or not self._source.health.is_stopped:
             texts.append(_triggered("/simulation/start"))
@@ -120,15 +126,13 @@ class FlightActions(GoalEditing):
         return self._send(robot, pose, f"goal {place} m sent{why}")
 
     def _send(self, robot: int, pose: Pose2D, text: str) -> Answer:
-        publisher, end_s = self._goals[robot], time.monotonic() + _CONNECTS_WITHIN_S
-        while not publisher.get_num_connections():
-            if time.monotonic() > end_s:
-                return Answer(
-                    False,
-                    f"quad{robot}: goal not sent: no node subscribes to"
-                    f" {publisher.resolved_name}; expected its navigator",
-                )
-            time.sleep(_POLL_S)
+        publisher = self._goals[robot]
+        if not _is_heard(publisher):
+            return Answer(
+                False,
+                f"quad{robot}: goal not sent: no node subscribes to {publisher.resolved_name};"
+                " expected its navigator",
+            )
         publisher.publish(pose_stamped(planar_pose(pose), "map", _now()))
         self._source.show_goal(robot, pose)
         goals = self._source.health.progress(robot)
@@ -199,6 +203,26 @@ class FlightActions(GoalEditing):
         request = SetBoolRequest(bool(is_on))
         return Answer(True, _succeeded(call(f"/simulation/lidar{robot}/enable", SetBool, request)))
 
+    def set_pose(self, robot: int, pose: Pose2D) -> Answer:
+        """Tell a robot where it is, as RViz does."""
+        faults = list(goal_faults([pose.x_m, pose.y_m, pose.yaw_rad]))
+        if faults or robot not in self._robots:
+            return Answer(False, f"quad{robot}: pose{faults[0] if faults else ': no such robot'}")
+        topic = f"/initialpose{robot}"
+        if robot not in self._poses:
+            self._poses[robot] = rospy.Publisher(topic, PoseWithCovarianceStamped, queue_size=1)
+        if not _is_heard(self._poses[robot]):
+            return Answer(False, f"quad{robot}: no node subscribes to {topic}; expected amcl, slam")
+        covariance = covariance_36(GIVEN_COVARIANCE).tolist()
+        given = PoseWithCovariance(pose_message(pose.to_3d()), covariance)
+        self._poses[robot].publish(PoseWithCovarianceStamped(Header(0, _now(), "map"), given))
+        return Answer(True, f"quad{robot}: {given_text(pose)}")
+
+    def set_uniform(self, robot: int) -> Answer:
+        """Let a robot search the whole map."""
+        call(f"/amcl{robot}/global_localization", Empty)
+        return Answer(True, f"quad{robot}: {SEARCHES}")
+
     def parameters(self, robot: int) -> List[ParameterView]:
         """Return the parameters of a robot's navigator; none if it does not respond."""
         try:
@@ -222,6 +246,16 @@ class FlightActions(GoalEditing):
             self._checks[robot] = known, place_check(*known)
         check: PlaceCheck = self._checks[robot][1]
         return check
+
+
+def _is_heard(publisher: rospy.Publisher) -> bool:
+    """Wait for a subscriber; return False if none comes."""
+    end_s = time.monotonic() + _CONNECTS_WITHIN_S
+    while not publisher.get_num_connections():
+        if time.monotonic() > end_s:
+            return False
+        time.sleep(_POLL_S)
+    return True
 
 
 def _triggered(name: str) -> str:

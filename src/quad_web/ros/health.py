@@ -165,6 +165,15 @@ class FleetHealth:
         missions = [self.progress(i) for i in range(self._robots)]
         return self.is_stopped and all(one.is_stopped or one.is_done for one in missions)
 
+    def localization(self, robot: int) -> Tuple[str, bool]:
+        """Return what localizes a robot, "amcl", "slam" or "", and whether it says: lost."""
+        parts = {"amcl": f"amcl{robot}: Standard deviation", "slam": f"quad{robot}: localization"}
+        for name, part in parts.items():
+            status = self._statuses.get(part)
+            if status is not None:
+                return name, status.level == "ERROR" or "lost" in status.message
+        return "", False
+
     # -- the simulator -------------------------------------------------------------------
 
     @property

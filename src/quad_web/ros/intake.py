@@ -8,7 +8,8 @@ from __future__ import annotations
 import functools
 import threading
 import time
-from typing import Any, Callable, Dict, Mapping, NamedTuple, Optional, Tuple
+from collections import deque
+from typing import Any, Callable, Deque, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import rosgraph
 import rospy
@@ -40,27 +41,31 @@ class Topic(NamedTuple):
 
 
 class Newest:
-    """The newest message of a topic, as bytes.
+    """The newest messages of a topic, as bytes.
 
     Attributes:
         topic: The topic, for `Subscriptions`.
         received_s: Wall time, monotonic, of the newest message; None before the first.
     """
 
-    def __init__(self, name: str, message_type: Any) -> None:
+    def __init__(self, name: str, message_type: Any, kept: int = 1) -> None:
         """Keep messages of this type; subscribing is up to `Subscriptions`."""
         self._name, self._message_type = name, message_type
-        self._raw: Optional[Any] = None
+        self._raw: Deque[Any] = deque(maxlen=kept)
         self.received_s: Optional[float] = None
         self.topic = Topic(raw_type(message_type), self._store)
 
     def _store(self, message: Any) -> None:
-        self._raw, self.received_s = message, time.monotonic()
+        self._raw.append(message)
+        self.received_s = time.monotonic()
+
+    def clear(self) -> None:
+        """Forget what is kept."""
+        self._raw.clear()
 
     def take_bytes(self) -> Optional[bytes]:
         """Return the newest message's bytes; None if there is none since the last call."""
-        message, self._raw = self._raw, None
-        return None if message is None else message.data_bytes
+        return self._raw.popleft().data_bytes if self._raw else None
 
     def take(self) -> Optional[Any]:
         """Return the newest message; None if there is none since the last call.
@@ -68,10 +73,21 @@ class Newest:
         Raises:
             ValueError: If it cannot be decoded.
         """
-        message, self._raw = self._raw, None
-        if message is None or not hasattr(message, "data_bytes"):
-            return message  # another subscriber of this process has had it decoded
-        return decoded(self._message_type, message.data_bytes)
+        messages = self.take_all()
+        return messages[-1] if messages else None
+
+    def take_all(self) -> List[Any]:
+        """Return all messages that are kept since the last call, the oldest first.
+
+        Raises:
+            ValueError: If one cannot be decoded.
+        """
+        raw = [self._raw.popleft() for _ in range(len(self._raw))]
+        # Another subscriber of this process may have had a message decoded.
+        return [
+            decoded(self._message_type, one.data_bytes) if hasattr(one, "data_bytes") else one
+            for one in raw
+        ]
 
 
 def decoded(message_type: Any, data: bytes) -> Any:

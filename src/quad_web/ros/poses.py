@@ -15,12 +15,20 @@ from numpy.typing import NDArray
 from quad_nav.geometry import Pose3D, yaws_from_quaternions
 from quad_nav.ros.common.conversions import odometry_from_message, time_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
-from quad_nav.ros.common.packed_messages import STATES_TOPIC, States, StatesMessage, StatesReader
+from quad_nav.ros.common.packed_messages import (
+    STATES_TOPIC,
+    Floats,
+    States,
+    StatesMessage,
+    StatesReader,
+)
 from quad_nav.ros.common.rospy_repairs import set_time
 from quad_nav.topics.validation import odometry_problem, valid_states
 from quad_web.ros.frames import Frames
 from quad_web.ros.intake import Newest, Topic
 from quad_web.view.items import UNKNOWN_BODY, body_row
+from quad_web.view.rows import SAMPLE_PERIOD_S
+from quad_web.view.state import MAX_SAMPLES
 
 MAP = "map"
 MISSING_AFTER_S = 1.5
@@ -49,6 +57,8 @@ class Bodies:
         self._frames = frames
         self._in_bulk_s = np.full(robots, -np.inf)
         self._messages: Deque[Tuple[float, StatesMessage]] = collections.deque(maxlen=_HISTORY)
+        self._sampled: Deque[StatesMessage] = collections.deque(maxlen=MAX_SAMPLES)
+        self._sampled_s = -np.inf  # stamp of the last of them
         self._is_new = False
         self._odometry: Dict[int, Newest] = {}
         self._reader, self._warnings = StatesReader(), ThrottledWarnings()
@@ -58,6 +68,7 @@ class Bodies:
         """Expect messages from now on: a client has come."""
         self._in_bulk_s[:] = time.monotonic()
         self._messages.clear()
+        self._sampled.clear()
 
     def topics(self) -> Dict[str, Topic]:
         """Return the topics to subscribe to at present."""
@@ -73,7 +84,11 @@ class Bodies:
         if len(message.data) < _STAMP.size:
             return
         seconds, nanoseconds = _STAMP.unpack_from(message.data)
-        self._messages.append((seconds + nanoseconds / 1e9, message))
+        stamp_s = seconds + nanoseconds / 1e9
+        self._messages.append((stamp_s, message))
+        if not 0.0 <= stamp_s - self._sampled_s < SAMPLE_PERIOD_S - _SAME_S:
+            self._sampled_s = stamp_s
+            self._sampled.append(message)
         self.wall_s, self._is_new = time.time(), True
 
     def refresh(self) -> bool:
@@ -102,17 +117,24 @@ class Bodies:
     def _take(self, states: States) -> bool:
         if not len(states.robots):
             return False
-        rows = np.empty((len(states.robots), 13))
-        rows[:, :7] = states.poses
-        yaw_rad = yaws_from_quaternions(states.poses[:, 3:])
-        cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
-        vx_mps, vy_mps = states.twists[:, 0], states.twists[:, 1]
-        rows[:, 7], rows[:, 8] = cos * vx_mps - sin * vy_mps, sin * vx_mps + cos * vy_mps
-        rows[:, 9:] = states.twists[:, 2:]
-        self.rows[states.robots] = rows
+        self.rows[states.robots] = _rows(states)
         self.heard_s[states.robots] = self._in_bulk_s[states.robots] = time.monotonic()
         self.stamp_s = states.stamp_s
         return True
+
+    def samples(self) -> List[Tuple[float, Floats]]:
+        """Return times and rows since the last call, `SAMPLE_PERIOD_S` apart.
+
+        Robots whose states are not in bulk are where they are now.
+        """
+        found = []
+        for _ in range(len(self._sampled)):
+            states = self._read(self._sampled.popleft())
+            if states is not None:
+                rows = self.rows.copy()
+                rows[states.robots] = _rows(states)
+                found.append((states.stamp_s, rows))
+        return found or [(self.stamp_s, self.rows.copy())]
 
     def _take_odometry(self, robot: int, newest: Newest) -> bool:
         topic = f"/odom{robot}"
@@ -159,3 +181,15 @@ class Bodies:
     def ages_s(self) -> NDArray[np.float64]:
         """Return the wall time since each robot's last pose, float64[n]; inf before the first."""
         return np.asarray(time.monotonic() - self.heard_s)
+
+
+def _rows(states: States) -> Floats:
+    """Return the rows of states in `map`."""
+    rows = np.empty((len(states.robots), 13))
+    rows[:, :7] = states.poses
+    yaw_rad = yaws_from_quaternions(states.poses[:, 3:])
+    cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
+    vx_mps, vy_mps = states.twists[:, 0], states.twists[:, 1]
+    rows[:, 7], rows[:, 8] = cos * vx_mps - sin * vy_mps, sin * vx_mps + cos * vy_mps
+    rows[:, 9:] = states.twists[:, 2:]
+    return rows

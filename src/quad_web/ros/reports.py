@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import threading
 import time
@@ -12,7 +13,7 @@ from quad.msg import Contact as ContactMessage
 from quad.msg import FlightInfo, MissionEvent
 from rosgraph_msgs.msg import Log
 from roslib.message import get_message_class
-from std_msgs.msg import Time
+from std_msgs.msg import String, Time
 from visualization_msgs.msg import Marker, MarkerArray
 
 from quad_nav.errors import InputError, excerpt
@@ -24,12 +25,13 @@ from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.topics.contacts import CONTACTS_TOPIC, contact_from_message
 from quad_nav.topics.flight_info import FLIGHT_TOPIC, RESET_TOPIC, flight_info_from_message
-from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event_from_message
+from quad_nav.topics.mission_events import EVENTS_TOPIC, SUMMARY_TOPIC, mission_event_from_message
 from quad_nav.topics.right_of_way import RightOfWay
 from quad_nav.topics.robot_topics import COLUMNS, ROBOT_TOPICS
 from quad_nav.topics.validation import MAX_MAGNITUDE
 from quad_web.ros.intake import Newest, Topic
-from quad_web.view.state import FleetState
+from quad_web.view.result import result_item
+from quad_web.view.state import FleetState, Item
 
 MAX_CONTACTS, MAX_GOALS, MAX_TEXT = 500, 20_000, 500
 _LEVELS = {Log.WARN: "warning", Log.ERROR: "error", Log.FATAL: "error"}
@@ -39,6 +41,7 @@ _GOAL = re.compile(r"goal(\d{1,4})(_yaw)?")
 _COLUMNS = {topic.name for topic in COLUMNS}
 # The state comes with the diagnostics, which C++ move_base and a dead node do not publish.
 _HEARD = {topic.name: topic for topic in ROBOT_TOPICS if topic.name != "state"}
+_HINT = "quad report FILE.bag"
 _CONTACT = "CONTACT with"  # the sequencer repeats what the simulator has logged
 _ACTIVE_ALPHA, _REACHED_ALPHA = 0.95, 0.4  # of the spheres of goals, see topics.markers
 
@@ -51,6 +54,7 @@ class FlightReports:
         radius_m: Radius of a robot's hull.
         trees: Parameters of each robot's navigator as the mission has loaded them.
         contacts: The last contacts.
+        result: How the mission has ended, the item of the page; None while it flies.
         recoveries: Number of the last recovery behaviour of each robot's goal, and of all.
         sent_s: Wall time, monotonic, at which each robot's sequencer has sent its last goal.
         version: Counts changes of scene, radius and trees.
@@ -63,6 +67,7 @@ class FlightReports:
         self.radius_m = BODY_RADIUS_M
         self.trees: Dict[int, Mapping[str, Any]] = {}
         self.contacts: List[Contact] = []
+        self.result: Optional[Item] = None
         self.version = self.resets = 0
         self._robots, self._state = robots, state
         self._failed: Set[Tuple[int, int]] = set()
@@ -79,6 +84,7 @@ class FlightReports:
         topics = {
             FLIGHT_TOPIC: Topic(FlightInfo, self._on_flight),
             EVENTS_TOPIC: Topic(MissionEvent, self._on_event),
+            SUMMARY_TOPIC: Topic(String, self._on_summary),
             RESET_TOPIC: Topic(Time, self._on_reset),
             CONTACTS_TOPIC: Topic(ContactMessage, self._on_contact),
             "/rosout_agg": Topic(Log, self._on_log),
@@ -133,6 +139,14 @@ class FlightReports:
         if event.event is Event.SENT:
             self.recoveries.pop(robot, None)
             self.sent_s[robot] = time.monotonic()
+
+    def _on_summary(self, message: String) -> None:
+        try:
+            summary = json.loads(message.data) if message.data else None
+            self.result = None if summary is None else result_item(summary, _HINT)
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+            text = excerpt(f"{SUMMARY_TOPIC}: message dropped: {error!r}", MAX_TEXT)
+            self._warnings.warn(f"web: {text}", kind="summary")
 
     def _on_contact(self, message: ContactMessage) -> None:
         try:

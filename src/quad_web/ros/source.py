@@ -7,7 +7,9 @@ import threading
 import time
 from typing import Any, Dict, FrozenSet, List, Mapping, Optional, Sequence, Set, Tuple
 
+import numpy as np
 import rospy
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
 from quad_nav.scenario.rules import START_S
@@ -17,6 +19,7 @@ from quad_web.ros.frames import Frames
 from quad_web.ros.health import LOST_AFTER_S, FleetHealth
 from quad_web.ros.intake import Subscriptions
 from quad_web.ros.layers import Layers
+from quad_web.ros.localizations import Localizations
 from quad_web.ros.obstacles import Obstacles
 from quad_web.ros.parameters import NavigatorTrees
 from quad_web.ros.poses import Bodies
@@ -24,6 +27,7 @@ from quad_web.ros.reports import FlightReports
 from quad_web.view import rows
 from quad_web.view.cells import cell_items
 from quad_web.view.items import Trails, poses_item, robots_item, scene_item
+from quad_web.view.localization import LOST
 from quad_web.view.state import FleetState, Item, Wanted, robots_by_layer
 
 PERIOD_S = 0.05  # wall time, as the others; the stream sends half as often
@@ -33,6 +37,7 @@ _EXPECTED_S = 1.5  # time until the diagnostics tell of a pause, a stop or a sta
 _SETTLES_S = 2.0  # time until a navigator tells of a goal that was sent
 _JUMP_S = 0.5
 
+Floats = NDArray[np.float64]
 Shown = Mapping[str, FrozenSet[int]]
 
 
@@ -57,6 +62,7 @@ class FlightSource:
         self.trees = NavigatorTrees(self.reports.trees)
         self._layers = Layers(self.bodies, self._frames, self.trees.tree)
         self._obstacles = Obstacles()
+        self._localizations = Localizations(robots, self.health)
         self._subscriptions = Subscriptions()
         self._trails = Trails()
         self._seen: Dict[str, Any] = {}  # data of items that seldom change, by key
@@ -132,6 +138,7 @@ class FlightSource:
             topics.update(self.health.topics())
             topics.update(self._layers.topics(shown))
             topics.update(self._obstacles.topics(self.reports.scene))
+            topics.update(self._localizations.topics(shown["localization"]))
         self._subscriptions.want(topics)
 
     # -- items ---------------------------------------------------------------------------
@@ -147,11 +154,15 @@ class FlightSource:
             items += self._layers.items() + self._trails.items(sorted(shown["trail"]))
             items += self._cells(sorted(shown["cell"]))
             items += self._obstacles.items(self.reports.scene)
+            items += self._localizations.items(shown["localization"])
             removed |= self._gone(shown)
         if self._count % _ROWS_EVERY == 0:
             items += self._tables()
         if self._count % _HEALTH_EVERY == _HEALTH_EVERY // 2:
             items.append(self.health.item())
+        if self.reports.result is None:
+            removed.add("result")
+            self._seen.pop("result", None)
         items = [item for item in items if item.key not in removed]
         if items or removed:
             self._state.put_all(items, tuple(removed))
@@ -177,6 +188,7 @@ class FlightSource:
     def _gone(self, shown: Shown) -> Set[str]:
         """Return the keys of layers that no page shows, or that a robot no longer has."""
         keys = set(self._layers.keys) | {f"cell/{i}" for i in shown["cell"]}
+        keys |= self._localizations.keys
         for i in range(len(self._names)):
             if not self.health.has_lidar(i):
                 keys.discard(f"scan/{i}")
@@ -189,20 +201,14 @@ class FlightSource:
         return {key for key in before | self._layers.keys if key not in keys}
 
     def _tables(self) -> List[Item]:
-        reports, stamp_s = self.reports, self.bodies.stamp_s
-        poses = poses_item(stamp_s, 0.0, self.bodies.rows).arrays["pose"]
-        samples = rows.samples_item(
-            stamp_s,
-            poses,
-            reports.radius_m,
-            reports.scene,
-            self._obstacles.solids(),
-            self.health.cycles_s(),
+        reports = self.reports
+        samples = rows.sample_items(
+            self.bodies.samples(), reports.radius_m, self._distances_m, self.health.cycles_s()
         )
         goals = self._goal_rows()
         active = {row["robot"]: row for row in goals if row["state"] == "active"}
         now = {i: self._robot_now(i, active.get(i)) for i in range(len(self._names))}
-        status, yields = rows.fleet_items(now, self._names, samples)
+        status, yields = rows.fleet_items(now, self._names, samples[-1])
         seldom = [
             yields,
             rows.goals_item(goals),
@@ -212,9 +218,17 @@ class FlightSource:
             self._version = reports.version
             seldom.append(robots_item(self._names, reports.radius_m))
             seldom += [scene_item(reports.scene)] if reports.scene is not None else []
+        if reports.result is not None:
+            seldom.append(reports.result)
         changed = [item for item in seldom if self._seen.get(item.key) != item.data]
         self._seen.update({item.key: item.data for item in changed})
-        return [self._flight_item(), status, samples, *changed]
+        return [self._flight_item(), status, *samples, *changed]
+
+    def _distances_m(self, positions: Floats, times_s: Floats) -> Floats:
+        scene = self.reports.scene
+        if scene is None:
+            return np.full(len(positions), np.nan)
+        return self._obstacles.distances_m(scene, positions, times_s)
 
     def _goal_rows(self) -> List[Dict[str, Any]]:
         """Return the goals of the mission, and after them those that people have sent."""
@@ -236,6 +250,7 @@ class FlightSource:
         pose_age_s = float(self.bodies.ages_s()[robot])
         progress = self.health.progress(robot)
         is_stopped, lost = bool(reason) or progress.is_stopped, ""
+        located = self._localizations.located(robot)
         if silent_s > LOST_AFTER_S:
             lost = f"no message of its navigator for {silent_s:.0f} s"
         elif pose_age_s > LOST_AFTER_S and math.isfinite(pose_age_s):
@@ -244,6 +259,8 @@ class FlightSource:
             self.reports.forget_navigator(robot)
         elif progress.is_stopped and not reason:
             reason = "stopped by a person; Resume continues its mission"
+        if located is not None and located.is_lost:
+            lost = lost or LOST
         right = self.reports.right_of_way(robot)
         return rows.RobotNow(
             navigator or "idle",
@@ -259,6 +276,7 @@ class FlightSource:
             age_s=silent_s if silent_s > LOST_AFTER_S else pose_age_s,
             lidar=self.health.has_lidar(robot),
             reason=lost or reason,
+            localization=None if located is None else located.row(),
         )
 
     def _distance_m(self, robot: int, goal: Optional[Mapping[str, Any]]) -> float:
@@ -268,26 +286,28 @@ class FlightSource:
         x_m, y_m = self.bodies.positions[robot].tolist()
         return goal_distance_m(Pose2D(goal["x"], goal["y"]), Pose2D(x_m, y_m))
 
+    @property
+    def flight_state(self) -> str:
+        """The state of the flight, as of ``rows.flight_item``."""
+        if float(self.bodies.ages_s().min(initial=math.inf)) > LOST_AFTER_S:
+            return "waiting"
+        if self._is("stopped", self.health.are_all_stopped):
+            return "stopped"
+        if self._is("paused", self.health.is_paused):
+            return "ready" if self.bodies.stamp_s <= START_S + _JUMP_S else "paused"
+        return "running" if self.reports.result is None else "ended"
+
     def _flight_item(self) -> Item:
         rate, wanted_rate = self.health.rates
-        stamp_s = self.bodies.stamp_s
-        silent_s = float(self.bodies.ages_s().min(initial=math.inf))
-        is_paused = self._is("paused", self.health.is_paused)
-        state, reason = "running", ""
-        if silent_s > LOST_AFTER_S:
-            state, reason = "waiting", "no poses of any quadcopter"
-        elif self._is("stopped", self.health.are_all_stopped):
-            state = "stopped"
-        elif is_paused:
-            state = "ready" if stamp_s <= START_S + _JUMP_S else "paused"
+        state = self.flight_state
         if wanted_rate is not None and wanted_rate >= FASTEST_RATE:
             wanted_rate = 0.0
         return rows.flight_item(
             "ros",
             self._title,
             state,
-            stamp_s,
-            rate=0.0 if is_paused else rate,
+            self.bodies.stamp_s,
+            rate=0.0 if self._is("paused", self.health.is_paused) else rate,
             wanted_rate=wanted_rate,
-            reason=reason,
+            reason="no poses of any quadcopter" if state == "waiting" else "",
         )

@@ -17,14 +17,14 @@ import { Hud, LinkNotice } from "./hud.js";
 import { make, say } from "./dom.js";
 import { sharedLink } from "./link.js";
 import { MapView } from "./map_view.js";
-import { GoalTool, ViewTool } from "./tools.js";
+import { GoalTool, PoseTool, ViewTool } from "./tools.js";
 
 const PAN_PX = 60;
 const PANS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /** The arena in an element of the page. */
 export class View {
-  /** `emit` tells Python: select, goal, edit, tool, mode, follow. */
+  /** `emit` tells Python: select, goal, pose, edit, tool, mode, follow. */
   constructor(root, emit) {
     this.emit = emit;
     this.editing = null;
@@ -33,7 +33,12 @@ export class View {
     this._role = "watch";
     this._isFollowing = false;
     this._isFitted = false;
-    this._tools = { view: new ViewTool(this), goal: new GoalTool(this), edit: new EditTool(this) };
+    this._tools = {
+      view: new ViewTool(this),
+      goal: new GoalTool(this),
+      pose: new PoseTool(this),
+      edit: new EditTool(this),
+    };
     this._tool = "view";
     this._mode = "2d";
     this._map = make("canvas", { class: "quad-map" });
@@ -297,6 +302,7 @@ export class View {
       this._tools.edit.draw(context, this.view);
     }
     this._tools.goal.draw(context, this.view);
+    this._tools.pose.draw(context, this.view);
   }
 
   _moved() {

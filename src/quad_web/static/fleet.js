@@ -2,7 +2,7 @@
  * What both views draw: one plain object for each thing, made from the items of the store.
  */
 
-import { INK, seen } from "./colours.js";
+import { INK, mix, seen } from "./colours.js";
 
 /** Layers that the server sends on request, as in `view/state.py`. */
 export const STREAMED_LAYERS = [
@@ -14,6 +14,7 @@ export const STREAMED_LAYERS = [
   "local_costmap",
   "cell",
   "track",
+  "localization",
 ];
 
 /** In larger fleets LIDAR points, local plans and tracks are those of the selected robot. */
@@ -72,6 +73,7 @@ export function fleetOf(store, choices) {
     localPlans: polylines("local_plan"),
     cells: polylines("cell"),
     scans: polylines("scan"),
+    localizations: shown("localization") ? localizationsOf(store, colourOf) : [],
     tracks: shown("track") ? tracksOf(store, colourOf, choices) : [],
     costmaps: OF_ONE_ROBOT.filter(shown).flatMap((kind) => store.all(kind)),
     goals: shown("goals") ? goalsOf(store, colourOf, choices) : [],
@@ -127,6 +129,15 @@ function tracksOf(store, colourOf, { selected }) {
       return { robot, colour: colourOf(robot), x, y, vx, vy, radius, kind: TRACK_KINDS[kind] };
     }),
   );
+}
+
+/** Where robots believe themselves; `variances` are xx, xy, yy and that of the yaw. */
+function localizationsOf(store, colourOf) {
+  return store.all("localization").map(({ robot, data, arrays: { pose, points } }) => {
+    const [x, y, yaw, ...variances] = pose.values;
+    const colour = data.is_lost ? INK.fault : mix(colourOf(robot), INK.strong, 0.45);
+    return { robot, colour, x, y, yaw, variances, points: points.values, isLost: data.is_lost };
+  });
 }
 
 function goalsOf(store, colourOf, { editing, selected }) {

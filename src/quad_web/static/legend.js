@@ -10,6 +10,7 @@ import {
   drawContacts,
   drawCross,
   drawGoal,
+  drawLocalizations,
   drawTracks,
   GOAL_SIZES,
 } from "./map_marks.js";
@@ -95,6 +96,12 @@ function track(kind) {
   };
 }
 
+function localization(context) {
+  const points = [-12, 4, -9, -5, -4, 6, -1, -7, 3, 5, 6, -4];
+  const pose = { x: -6, y: 0, yaw: 0, variances: [16, 0, 6, 0.01] };
+  drawLocalizations(context, toScreen, [{ ...pose, points, colour: COLOUR, isLost: false }]);
+}
+
 function costs(first, last) {
   return (context) => {
     for (let i = 0; i < WIDTH; i += 1) {
@@ -144,6 +151,7 @@ const ENTRIES = [
   ["Local plan", path("localPlans"), has("localPlans")],
   ["LIDAR points", scan, has("scans")],
   ["Voronoi cell", cell, has("cells")],
+  ["Believed pose: within with 95 %; particles", localization, has("localizations")],
   ["Tracked obstacle; the line ends where it is in 1 s", track("seen"), isTrack("seen")],
   ["Tracked, but hidden: predicted", track("hidden"), isTrack("hidden")],
   ["Suspect: may move", track("suspect"), isTrack("suspect")],

@@ -13,6 +13,7 @@ export const FONT = "Roboto, system-ui, sans-serif";
 const FEW_GOALS = 12;
 
 const TRACK_CORNERS = 32;
+const CHI_SQUARED = 5.99; // two degrees of freedom, 95 %
 const AHEAD_S = 1; // after which a tracked obstacle is at the end of its line
 const SLOWEST_MPS = 0.05; // slower ones have no line
 
@@ -172,6 +173,41 @@ export function drawTracks(context, toScreen, tracks) {
       drawDashes(context, ends, [], withAlpha(colour, ring), 2);
     }
   }
+}
+
+/** Draw particles, and the ellipse and sector in which poses are with 95 %; lost ones dashed. */
+export function drawLocalizations(context, toScreen, localizations) {
+  for (const { x, y, yaw, variances, points, colour, isLost } of localizations) {
+    context.fillStyle = withAlpha(colour, 0.55);
+    for (let i = 0; i < points.length; i += 2) {
+      const [px, py] = toScreen(points[i], points[i + 1]);
+      context.fillRect(px - 1, py - 1, 2, 2);
+    }
+    if (!Number.isFinite(x) || !variances.every(Number.isFinite)) {
+      continue;
+    }
+    const corners = ellipse(x, y, variances).map((place) => toScreen(...place));
+    drawDashes(context, corners, isLost ? [5, 4] : [], colour, 2);
+    context.fillStyle = withAlpha(colour, 0.15);
+    context.fill();
+    const half = Math.min(Math.PI, 1.96 * Math.sqrt(Math.max(0, variances[3])));
+    const tips = [-half, 0, half].map((turn) => ahead(toScreen, { x, y, yaw: yaw + turn }, 34));
+    drawDashes(context, [tips[0], toScreen(x, y), tips[2]], [3, 3], colour, 1);
+    drawArrow(context, toScreen(x, y), tips[1], colour, 2);
+  }
+}
+
+/** Return the ellipse of a covariance that has 95 % of a normal distribution. */
+function ellipse(x, y, [xx, xy, yy]) {
+  const [mean, turned] = [(xx + yy) / 2, Math.hypot((xx - yy) / 2, xy)];
+  const angle = Math.atan2(2 * xy, xx - yy) / 2;
+  const [a, b] = [mean + turned, mean - turned].map((v) => Math.sqrt(CHI_SQUARED * Math.max(v, 0)));
+  const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
+  return Array.from({ length: TRACK_CORNERS + 1 }, (_, i) => {
+    const t = (2 * Math.PI * i) / TRACK_CORNERS;
+    const [u, v] = [a * Math.cos(t), b * Math.sin(t)];
+    return [x + cos * u - sin * v, y + sin * u + cos * v];
+  });
 }
 
 /** Draw contacts; recent ones with their time. */

@@ -3,7 +3,13 @@
  */
 
 import { boundsOf } from "./fleet.js";
-import { drawContacts, drawGoals, drawTracks, drawYields } from "./map_marks.js";
+import {
+  drawContacts,
+  drawGoals,
+  drawLocalizations,
+  drawTracks,
+  drawYields,
+} from "./map_marks.js";
 import { drawCells, drawPaths, drawScans } from "./map_paths.js";
 import { drawNumbers, drawRobot, drawnRadius } from "./map_robots.js";
 import { CostmapImages, drawCostmaps, drawFloor, drawObstacles, drawSolids } from "./map_scene.js";
@@ -120,6 +126,7 @@ export class MapView {
     drawScans(context, viewport, fleet.scans);
     drawYields(context, toScreen, fleet.yields, (robot) => this.reachOf(robot));
     this._drawRobots(context, fleet, labels);
+    drawLocalizations(context, toScreen, fleet.localizations);
     drawContacts(context, toScreen, fleet.contacts);
   }
 

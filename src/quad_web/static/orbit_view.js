@@ -7,7 +7,13 @@ import { OrbitControls } from "OrbitControls";
 
 import { INK } from "./colours.js";
 import { boundsOf } from "./fleet.js";
-import { drawContacts, drawGoals, drawTracks, drawYields } from "./map_marks.js";
+import {
+  drawContacts,
+  drawGoals,
+  drawLocalizations,
+  drawTracks,
+  drawYields,
+} from "./map_marks.js";
 import { drawNumbers } from "./map_robots.js";
 import { numberMarks } from "./map_view.js";
 import { Lines, Points, Ribbons } from "./orbit_batches.js";
@@ -257,6 +263,7 @@ export class OrbitView {
   drawLabels(context, fleet, { labels }) {
     const toScreen = (x, y, z) => this.toScreen(x, y, z);
     drawTracks(context, toScreen, fleet.tracks);
+    drawLocalizations(context, toScreen, fleet.localizations);
     const isFree = (goal) => fleet.robots.every((robot) => distance(robot, goal) > robot.radius);
     drawGoals(context, toScreen, fleet.goals.filter(isFree), fleet.selected !== null);
     drawYields(context, toScreen, fleet.yields, (robot) => this.reachOf(robot));

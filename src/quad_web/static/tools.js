@@ -1,5 +1,6 @@
 /**
- * Tools of the pointer: look at the fleet, and send a goal. `edit_tool.js` has the third one.
+ * Tools of the pointer: look at the fleet, send a goal, and tell a pose. `edit_tool.js` has another
+ * one.
  */
 
 import { INK } from "./colours.js";
@@ -70,6 +71,7 @@ export class GoalTool extends ViewTool {
   constructor(arena) {
     super(arena);
     this._goal = null;
+    this._event = "goal";
   }
 
   get hint() {
@@ -104,7 +106,7 @@ export class GoalTool extends ViewTool {
     this.drag(place);
     const { x, y, yaw } = this._goal;
     this._goal = null;
-    this._arena.emit("goal", { x, y, yaw });
+    this._arena.emit(this._event, { x, y, yaw });
     this._arena.requestDraw();
   }
 
@@ -129,5 +131,28 @@ export class GoalTool extends ViewTool {
     const degrees = goal.yaw === null ? "" : `, ${Math.round((goal.yaw * 180) / Math.PI)}°`;
     const text = `${goal.x.toFixed(2)}, ${goal.y.toFixed(2)} m${degrees}`;
     tag(context, text, at[0], at[1] + 24, INK.text);
+  }
+}
+
+/** Tells the selected robot where it is: press there, and drag to where it looks. */
+export class PoseTool extends GoalTool {
+  constructor(arena) {
+    super(arena);
+    this._event = "pose";
+  }
+
+  get hint() {
+    const robot = this._arena.fleet.selected;
+    return robot
+      ? `Press where robot ${robot.index} is, and drag to where it looks.`
+      : "Click the robot whose pose you know.";
+  }
+
+  tap(place) {
+    ViewTool.prototype.tap.call(this, place);
+  }
+
+  press(place) {
+    return this._arena.fleet.selected !== null && super.press(place);
   }
 }

@@ -85,6 +85,8 @@ LABELS: Dict[str, str] = {
     "clear_costmaps": "clear costmaps",
     "enable_lidar": "switch the LIDAR",
     "set_parameters": "change parameters",
+    "set_pose": "set the pose",
+    "set_uniform": "global localization",
     "save_goals": "save goals",
 }
 """The actions that change something, with their names for people."""
@@ -105,6 +107,8 @@ class Actions:
       ``set_rate(rate)`` in simulated seconds per second (0: as fast as it goes), ``seek(time_s)``
     * ``send_goal(robot, pose)`` in ``map``, None for the nearest robot; ``cancel(robot)``;
       ``stop_all()``; ``clear_costmaps(robot)``; ``enable_lidar(robot, is_on)``
+    * ``set_pose(robot, pose)`` tells a robot where it is; ``set_uniform(robot)`` lets it search the
+      whole map
     * ``parameters(robot)`` returns a list of ``ParameterView``, ``set_parameters(robot, namespace,
       values)`` changes those of one namespace
     * ``goal_files()`` returns a list of ``GoalFileView``, ``check_goals(robot, version, goals)``

@@ -44,7 +44,7 @@ class RobotNow:
         limited_by: Name of the peer that limited the last command, "" if none did.
         is_done: All of its goals have ended.
         is_stopped: It hovers for lack of data, or because a person wants that.
-        is_lost: It has not been heard of for too long.
+        is_lost: It has not been heard of for too long, or does not know its place.
         has_ended: The flight is over.
         goal: Number of the goal that it flies to, from 1; None without one.
         goals: Number of its goals, None if unknown.
@@ -53,6 +53,7 @@ class RobotNow:
         age_s: Time since the last message of the robot.
         lidar: Its LIDAR is on.
         reason: Why it is stopped, lost or without a plan, else "".
+        localization: Numbers of ``Located.row``; None if it knows its place.
     """
 
     navigator: str = "idle"
@@ -69,6 +70,7 @@ class RobotNow:
     age_s: float = 0.0
     lidar: bool = True
     reason: str = ""
+    localization: Optional[Mapping[str, Any]] = None
 
     def state(self, speed_mps: float) -> str:
         """Return the word for what the robot does, the first that is true."""
@@ -102,6 +104,7 @@ class RobotNow:
             **{name: _number(value) for name, value in numbers.items()},
             "lidar": self.lidar,
             "reason": self.reason,
+            "localization": self.localization,
         }
 
     def yield_rows(self, robot: int, names: Sequence[str]) -> List[Dict[str, Any]]:
@@ -265,19 +268,37 @@ class Samples:
 
         Args:
             radius_m: Radius of a hull.
-            distances_m: Distances to the nearest surface, see ``Movers``.
+            distances_m: Returns the distances of points float64[k, 2] at times float64[k] to the
+                nearest surface.
             cycles_s: float64[n], time of the last control cycle.
         """
-        if not self._times_s:
-            return []
-        times_s, bodies = np.array(self._times_s), np.array(self._bodies)
+        states = list(zip(self._times_s, self._bodies))
         self._times_s.clear()
         self._bodies.clear()
-        positions, speeds_mps = bodies[..., :2], np.hypot(bodies[..., 7], bodies[..., 8])
-        clearances_m = distances_m(positions.swapaxes(0, 1), times_s).T - radius_m
-        columns = zip(gaps_m(positions, radius_m), clearances_m, speeds_mps)
-        samples = zip(times_s.tolist(), columns)
-        return [_sample(time_s, (*values, cycles_s)) for time_s, values in samples]
+        return sample_items(states, radius_m, distances_m, cycles_s)
+
+
+def sample_items(
+    states: Sequence[Tuple[float, NDArray[np.float64]]],
+    radius_m: float,
+    distances_m: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
+    cycles_s: NDArray[np.float64],
+) -> List[Item]:
+    """Return the items ``samples`` of states: times, and bodies float64[n, 13].
+
+    The other arguments are those of ``Samples.take``; distances are asked for where robots are.
+    """
+    if not states:
+        return []
+    bodies = np.array([rows for _, rows in states])
+    positions, speeds_mps = bodies[..., :2], np.hypot(bodies[..., 7], bodies[..., 8])
+    known, clearances_m = np.isfinite(positions).all(axis=-1), np.full(speeds_mps.shape, np.nan)
+    if known.any():
+        times_s = np.repeat([time_s for time_s, _ in states], known.sum(axis=1))
+        clearances_m[known] = distances_m(positions[known], times_s) - radius_m
+    clearances_m[np.isinf(clearances_m)] = np.nan  # nothing can be touched
+    columns = zip(gaps_m(positions, radius_m), clearances_m, speeds_mps)
+    return [_sample(time_s, (*values, cycles_s)) for (time_s, _), values in zip(states, columns)]
 
 
 def _sample(time_s: float, columns: Sequence[NDArray[np.float64]]) -> Item:

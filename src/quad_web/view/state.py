@@ -38,6 +38,9 @@ key                       data                                arrays
 ``cell/i``                                                    points f4[k, 2]
 ``track/i``                                                   rows f4[k, 6]: x, y, vx, vy, radius,
                                                               kind: 0 seen, 1 hidden, 2 suspect
+``localization/i``        is_lost                             pose f4[7]: x, y, yaw, then their
+                                                              variances xx, xy, yy and of yaw;
+                                                              points f4[k, 2] of particles
 ========================  ==================================  =====================================
 
 Metres, radians and seconds, in ``map``. NaN in an array, and None in data, is unknown: a robot that
@@ -65,13 +68,14 @@ LAYERS = (
     "local_costmap",
     "cell",
     "track",
+    "localization",
 )
 """Kinds of items that a client can switch on and off. All others are always sent."""
 
 OF_ONE_ROBOT = ("global_costmap", "local_costmap")
 """Layers that are shown of the selected robot only."""
 
-COSTLY = ("scan", "local_plan", "track")
+COSTLY = ("scan", "local_plan", "track", "localization")
 """Layers of which a page of a large fleet shows the selected robot's only: new ones come at the
 rates of LIDAR and controller, and a node that has listeners must publish them."""
 

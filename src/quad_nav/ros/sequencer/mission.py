@@ -7,6 +7,7 @@ resumes it after a clock jump, and publishes goals and progress.
 from __future__ import annotations
 
 import contextlib
+import json
 import threading
 import time
 from dataclasses import replace
@@ -16,13 +17,13 @@ from typing import Dict, Iterator, List, Optional, Sequence
 import rospy
 from nav_msgs.msg import Odometry
 from quad.msg import FlightInfo
-from std_msgs.msg import Time
+from std_msgs.msg import String, Time
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.mission.checkpoint import MissionCheckpoint
 from quad_nav.mission.flight_log import FlightLog
-from quad_nav.mission.summary import MissionSummary, summarize
+from quad_nav.mission.summary import MissionSummary, summarize, to_json
 from quad_nav.ros.common import readiness
 from quad_nav.ros.common.diagnostics import DiagnosticsTopic, ThrottledWarnings
 from quad_nav.ros.common.marker_messages import replacing_markers
@@ -40,6 +41,7 @@ from quad_nav.ros.sequencer.state_feed import StateFeed
 from quad_nav.scenario.mission_setup import MissionSetup
 from quad_nav.topics.flight_info import FLIGHT_TOPIC, RESET_TOPIC, mission_info
 from quad_nav.topics.markers import goal_markers
+from quad_nav.topics.mission_events import SUMMARY_TOPIC
 from quad_nav.topics.validation import MAX_LEAD_S
 
 WAIT_S = 0.2  # wall time, as the next; longest delay until the node notices a shutdown
@@ -98,6 +100,7 @@ class MissionRunner:
         self._goals = rospy.Publisher("/goals", MarkerArray, queue_size=1, latch=True)
         self._diagnostics = DiagnosticsTopic()
         self._flight = rospy.Publisher(FLIGHT_TOPIC, FlightInfo, queue_size=1, latch=True)
+        self._summary = rospy.Publisher(SUMMARY_TOPIC, String, queue_size=1, latch=True)
         goals = {robot.name: robot.sequence for robot in setup.robots}
         info = mission_info(goals, setup.parameters, setup.robot_radius_m)
         self._flight.publish(flight_info_message(info))
@@ -263,6 +266,10 @@ class MissionRunner:
                 message = progress_message(self.robots, self._record.log, self._failures)
             self._diagnostics.publish(message)
         self._record.journal.retry()
+
+    def publish_summary(self, summary: Optional[MissionSummary]) -> None:
+        """Publish how the mission has ended; None: it flies, again."""
+        self._summary.publish("" if summary is None else json.dumps(to_json(summary)))
 
     @property
     def _failures(self) -> Dict[str, str]:

@@ -48,15 +48,20 @@ def watch(mission: MissionRunner, exit_when_done: bool, result: Path, stop: Stop
     """
     status: Optional[int] = None
     next_s = 0.0
+    mission.publish_summary(None)
     while not rospy.is_shutdown():
         mission.advance()
         if time.monotonic() >= next_s:
             next_s = time.monotonic() + DIAGNOSTICS_PERIOD_S
             mission.publish_progress()
         if not mission.is_done:
+            if status is not None:
+                mission.publish_summary(None)
             status = None
         elif status is None:
-            status = report(mission.summary(), result)
+            summary = mission.summary()
+            status = report(summary, result)
+            mission.publish_summary(summary)
             if exit_when_done:
                 mission.end()
                 return status
