@@ -102,8 +102,11 @@ class LatestTransforms(rospy.SubscribeListener):
 class SlamNode:
     """The node: robots, map and transforms."""
 
-    def __init__(self, robots: int, frames: Dict[int, Pose2D]) -> None:
-        self._slam = Slam(frames)
+    def __init__(self, robots: int, starts: Dict[int, Pose2D]) -> None:
+        """Advertise; without a start a robot's odometry frame is ``map``, roughly."""
+        self._starts = starts
+        self._frames = dict.fromkeys(range(robots), Pose2D(0.0, 0.0))
+        self._slam = Slam(self._frames)
         self._lock = threading.Lock()  # the diagnostics have their own thread
         self._robots = [SlamRobot(number) for number in range(robots)]
         self._transforms = Transforms()
@@ -149,6 +152,9 @@ class SlamNode:
             return True
         robot.taken_s = stamp.to_sec()
         scan, base = scan_from_message(message), odom_from_base.to_2d()
+        if robot.number in self._starts:
+            start = self._starts.pop(robot.number)
+            self._frames[robot.number] = start.compose(base.inverse())
         place = self._slam.add_scan(robot.number, scan, base, odom_from_lidar)
         self._publish(robot, place, stamp)
         return True
@@ -212,14 +218,16 @@ def main() -> int:
     if not is_whole(robots) or robots < 1:
         rospy.logfatal("slam: robots: %s; expected a whole number, at least 1", robots)
         return EXIT_BAD_INPUT
-    frames = {}
+    starts = {}
     for number in range(robots):
-        given = rospy.get_param(f"~odom{number}", [0.0, 0.0, 0.0])
+        given = rospy.get_param(f"~start{number}", None)
+        if given is None:
+            continue
         if not isinstance(given, list) or len(given) != 3 or not all(map(is_number, given)):
             rospy.logfatal(
-                "slam: odom%d: %s; expected its first pose in map, [x, y, yaw]", number, given
+                "slam: start%d: %s; expected its first pose in map, [x, y, yaw]", number, given
             )
             return EXIT_BAD_INPUT
-        frames[number] = Pose2D(*map(float, given))
-    SlamNode(robots, frames).spin()
+        starts[number] = Pose2D(*map(float, given))
+    SlamNode(robots, starts).spin()
     return 0
