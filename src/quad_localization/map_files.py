@@ -17,6 +17,7 @@ from quad_nav.files.output import reason, write_bytes, write_text
 from quad_nav.geometry import Pose2D
 from quad_nav.scenario.scene_map import scene_map
 from quad_nav.sim.map_file import load_map
+from quad_nav.sim.scene import Scene
 from quad_nav.sim.scene_file import load_scene
 
 CELL_M = 0.05
@@ -56,7 +57,12 @@ def read_map(path: Path, resolution_m: float) -> GridMap:
         if isinstance(document, dict) and "image" in document:
             found = load_map(document, path)
             return GridMap(found.occupancy, found.fields.resolution_m, found.fields.origin)
-    drawn = scene_map(load_scene(path), resolution_m)
+    return draw_map(load_scene(path), resolution_m)
+
+
+def draw_map(scene: Scene, resolution_m: float) -> GridMap:
+    """Draw the map of a scene at its flying altitude."""
+    drawn = scene_map(scene, resolution_m)
     corner = Pose2D(drawn.spec.origin_x_m, drawn.spec.origin_y_m)
     return GridMap(drawn.occupancy, resolution_m, corner)
 

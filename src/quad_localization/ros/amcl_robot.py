@@ -28,8 +28,7 @@ from quad_localization.localizer import Amcl, Observation, PoseEstimate, is_cova
 from quad_localization.occupancy_map import OccupancyMap
 from quad_localization.parameters import AmclParams, read_params
 from quad_localization.scan_beams import tilted_yaw
-from quad_localization.start import initial_pose
-from quad_nav.errors import InputError, excerpt
+from quad_nav.errors import excerpt
 from quad_nav.geometry import Pose2D, Pose3D, covariance_36
 from quad_nav.parameter import parameters_of
 from quad_nav.ros.common.conversions import (
@@ -53,6 +52,7 @@ _ASK_AGAIN_S = 0.5
 SILENT_S = 15.0
 """Time without a scan that could be used after which `/diagnostics` warns."""
 _PARAMETERS = [one for one in parameters_of(AmclParams) if not one.is_fixed]
+_STARTS = "/amcl_starts"  # parameter: those that `quad_localization.start` has found
 _ALPHAS = ("recovery_alpha_slow", "recovery_alpha_fast")
 
 
@@ -170,12 +170,12 @@ class AmclRobot:
             self._warn(f"the map is in frame '{excerpt(frame)}', expected '{wanted}'; using it")
         cells = np.array(message.data, np.int8).reshape(info.height, info.width)
         grid = OccupancyMap.from_occupancy(cells, info.resolution, *place, self.params.upstream)
-        one = self._read(rospy.get_param(self._names("~"), {}))
-        try:
-            pose = initial_pose(one, self.robot or 0)
-        except InputError as error:
-            self._warn(f"map dropped: {error}")
-            return False
+        given = rospy.get_param(self._names("~"), {})
+        one = self._read(given)
+        pose = Pose2D(one.initial_pose_x_m, one.initial_pose_y_m, one.initial_pose_a_rad)
+        if "initial_pose_x" not in given:  # neither a launch file nor `save_pose` has set it
+            start = rospy.get_param(f"{_STARTS}/quad{self.robot}", None)
+            pose = Pose2D(*start) if start else pose
         variances = (one.initial_cov_xx, one.initial_cov_yy, one.initial_cov_aa)
         with self._lock:
             start = PoseEstimate(pose, np.diag(variances))
