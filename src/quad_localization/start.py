@@ -15,7 +15,7 @@ from typing import List, Optional, Sequence
 
 import yaml
 
-from quad_nav.errors import InputError
+from quad_nav.errors import InputError, printable
 from quad_nav.geometry import Pose2D
 from quad_nav.scenario.scenario import scene_of
 
@@ -33,7 +33,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     with contextlib.suppress(InputError):
         starts = scene_of(vars(given)).starts
     rows = {f"quad{k}": [one.x_m, one.y_m, one.yaw_rad] for k, one in enumerate(starts)}
-    print(yaml.safe_dump(rows))
+    print(printable(yaml.safe_dump(rows), "\n"))
     return 0
 
 
