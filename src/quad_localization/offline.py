@@ -19,12 +19,12 @@ from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.scenario.scene_map import scene_map
-from quad_nav.sim.localization import Estimate, believed_states
+from quad_nav.sim.localization import Estimate, Localization, believed_states
 from quad_nav.sim.scene import Scene
 
 
-class SlamLocalization:
-    """``Slam`` for the loop: ``sim.localization.Localization``."""
+class SlamLocalization(Localization):
+    """``Slam`` for the loop. A map that grows cannot be searched as a whole."""
 
     def __init__(self, _scene: Scene, robots: int) -> None:
         """Start without a map; the odometry frames begin at ``map``."""
@@ -52,19 +52,12 @@ class SlamLocalization:
             return None
         return place.map_from_odom.compose(place.odom_from_base), place.covariance
 
-    def particles(self, robot: int) -> None:
-        """Return None: there are no particles."""
-
     def set_pose(self, robot: int, pose: Pose2D, covariance: NDArray[np.float64]) -> None:
         """Tell a robot roughly where it is; the covariance is that of the start."""
         self.slam.set_pose(robot, pose)
 
-    def set_uniform(self, robot: int) -> bool:
-        """Return False: a map that grows cannot be searched as a whole."""
-        return False
 
-
-class AmclLocalization:
+class AmclLocalization(Localization):
     """``Amcl`` of each robot for the loop, on the map of the scene.
 
     Attributes:
@@ -116,21 +109,21 @@ class AmclLocalization:
 
     def estimate(self, robot: int) -> Optional[Estimate]:
         """Return where a robot believed itself at its last scan."""
-        last = self._amcls[robot].estimate
+        last = self.amcls[robot].estimate
         return None if last is None else (self._place(robot), last.covariance)
 
     def particles(self, robot: int) -> Optional[NDArray[np.float64]]:
         """Return the particles."""
-        particles = self._amcls[robot].particles
+        particles = self.amcls[robot].particles
         return None if particles is None else particles.poses
 
     def set_pose(self, robot: int, pose: Pose2D, covariance: NDArray[np.float64]) -> None:
         """Tell a robot where it is."""
-        self._amcls[robot].set_pose(PoseEstimate(pose, covariance))
+        self.amcls[robot].set_pose(PoseEstimate(pose, covariance))
 
     def set_uniform(self, robot: int) -> bool:
         """Let a robot search the whole map."""
-        return self._amcls[robot].set_uniform()
+        return self.amcls[robot].set_uniform()
 
 
 MAKERS = {"amcl": AmclLocalization, "slam": SlamLocalization}

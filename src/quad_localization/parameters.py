@@ -12,7 +12,6 @@ from quad_nav.parameter import (
     InvalidValue,
     fixed_flag,
     fixed_number,
-    fixed_text,
     fixed_whole,
     flag,
     number,
@@ -109,9 +108,6 @@ class AmclParams:
     std_warn_level_x_m: float = fixed_number("std_warn_level_x", 0.2, "m", "Warned about above.")
     std_warn_level_y_m: float = fixed_number("std_warn_level_y", 0.2, "m", "The same.")
     std_warn_level_yaw_rad: float = fixed_number("std_warn_level_yaw", 0.1, "rad", "The same.")
-    scene: str = fixed_text(
-        "scene", "", "a file", "Scene whose start pose `robot` is the initial pose.", own=True
-    )
     seed: int = fixed_whole("seed", -1, "Of random numbers; -1: another at each start.", own=True)
     robot: int = fixed_whole("robot", -1, "Number of the robot; -1: that in its names.", own=True)
     peer_radius_m: float = fixed_number(

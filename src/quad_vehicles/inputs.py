@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Dict, List, Optional, Sequence
+from typing import Dict, List, Optional, Sequence, Tuple
 
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_vehicles.safety import (
     ESTIMATE_HOVER_S,
     HEARTBEAT_S,
+    LOST_HOVER_S,
     SILENT_S,
     STILL_MPS,
     STILL_S,
@@ -44,11 +45,18 @@ class Inputs:
         command_s: Time of that command.
         moved_sticks: Sticks that the pilot has moved in flight, "" for none.
         faults: Faults of the autopilot's parameters; None until they are checked.
+        map_from_odom: The odometry frame in ``map``, as a localization told last.
     """
 
-    def __init__(self, limits: Limits) -> None:
-        """Start without any input."""
-        self._limits = limits
+    def __init__(self, limits: Limits, localizer: str = "") -> None:
+        """Start without any input.
+
+        Args:
+            limits: Limits of the vehicle.
+            localizer: Name of what localizes it; "" if its odometry frame stands still.
+        """
+        self._limits, self._localizer = limits, localizer
+        self.map_from_odom: Optional[Pose2D] = None
         self.status: Optional[Status] = None
         self.landed = Landed.UNKNOWN
         self.estimate: Optional[Estimate] = None
@@ -57,7 +65,7 @@ class Inputs:
         self.command, self.command_s = Twist2D(), _NEVER_S
         self.moved_sticks = ""
         self.faults: Optional[Sequence[str]] = None
-        self.status_s = self._heard_s = self._estimate_s = self._idle_s = _NEVER_S
+        self.status_s = self._heard_s = self._estimate_s = self._idle_s = self._frame_s = _NEVER_S
         self._texts: Dict[str, float] = {}  # reason -> until when it counts
         self._acts: Dict[str, float] = {}  # what the autopilot does by itself -> when it said so
         self._battery_problem, self._estimate_problem = "", ""
@@ -99,6 +107,10 @@ class Inputs:
                 tuple(estimate.odom_from_base.translation.tolist()),
             )
         self._estimate_s = now_s
+
+    def take_frame(self, map_from_odom: Pose2D, now_s: float) -> None:
+        """Take the pose of the odometry frame; with infinite time it holds for good."""
+        self.map_from_odom, self._frame_s = map_from_odom, now_s
 
     def _is_frozen(self, before: Estimate, after: Estimate, now_s: float) -> bool:
         """Return whether the estimate stands still although the command is to move."""
@@ -168,8 +180,9 @@ class Inputs:
         self.command_s, self._idle_s = _NEVER_S, now_s
 
     def restore_link(self, now_s: float) -> None:
-        """Count a late estimate as late only from now on: before, the link was lost."""
+        """Count what is late as late only from now on: before, the link was lost."""
         self._estimate_s = max(self._estimate_s, now_s - ESTIMATE_HOVER_S)
+        self._frame_s = max(self._frame_s, now_s - LOST_HOVER_S)
         self.command_s = min(self.command_s, now_s)
 
     # What the state machine asks.
@@ -188,6 +201,10 @@ class Inputs:
         """Return whether there is no recent estimate."""
         return self.estimate is None or now_s - self._estimate_s > ESTIMATE_HOVER_S
 
+    def lost_s(self, now_s: float) -> float:
+        """Return the age of the localization's last word; 0 if none is needed."""
+        return max(now_s - self._frame_s, 0.0) if self._localizer else 0.0
+
     def not_ready(self, now_s: float) -> List[str]:
         """Return the reasons why the vehicle cannot take off."""
         reasons = []
@@ -197,6 +214,8 @@ class Inputs:
             reasons += self.faults
         if self.is_estimate_late(now_s):
             reasons.append(self._estimate_problem or "no position estimate")
+        if self.lost_s(now_s) > LOST_HOVER_S:
+            reasons.append(f"not localized: no transform map -> odom from {self._localizer}")
         if self._battery_problem:
             reasons.append(self._battery_problem)
         self._texts = {text: end_s for text, end_s in self._texts.items() if end_s > now_s}
@@ -206,8 +225,39 @@ class Inputs:
         """Return the height above a ground; 0 without an estimate."""
         return 0.0 if self.estimate is None else self.estimate.odom_from_base.z_m - ground_m
 
-    def view(self, now_s: float, start: Optional[Pose2D], ground_m: float) -> FlightView:
+    def map_from_base(self) -> Optional[Pose2D]:
+        """Return the vehicle's pose in ``map`` as a localization tells it; None without one."""
+        if self.estimate is None or self.map_from_odom is None:
+            return None
+        return self.map_from_odom.compose(self.estimate.odom_from_base.to_2d())
+
+    def ways(
+        self, odom_from_start: Optional[Pose2D], map_from_start: Optional[Pose2D]
+    ) -> List[Tuple[float, float]]:
+        """Return the ways (x, y) from the take-off in the body's axes, of all known frames.
+
+        Odometry drifts, but the autopilot's own fence counts by it.
+        """
+        odom_from_base = None if self.estimate is None else self.estimate.odom_from_base.to_2d()
+        found = []
+        for start, base in (
+            (odom_from_start, odom_from_base),
+            (map_from_start, self.map_from_base()),
+        ):
+            if start is not None and base is not None:
+                x_m, y_m = base.inverse_transform(start.x_m, start.y_m)
+                found.append((-x_m, -y_m))
+        return found
+
+    def view(
+        self, now_s: float, ways: Sequence[Tuple[float, float]], ground_m: float
+    ) -> FlightView:
         """Return the facts about the vehicle in flight.
+
+        Args:
+            now_s: Time.
+            ways: Those of ``ways``.
+            ground_m: Height of the ground in the odometry frame.
 
         Raises:
             ValueError: If no heartbeat has come yet.
@@ -215,9 +265,6 @@ class Inputs:
         if self.status is None:
             raise ValueError("no heartbeat yet")
         low_s = self._low_since_s
-        distance_m = 0.0
-        if start is not None and self.estimate is not None:
-            distance_m = start.distance_to(self.estimate.odom_from_base.to_2d())
         return FlightView(
             self.status,
             moved_sticks=self.moved_sticks,
@@ -229,10 +276,11 @@ class Inputs:
             estimate_age_s=now_s - self._estimate_s,
             estimate_problem=self._estimate_problem or "no new estimate",
             jump_m=self._jump_m,
+            lost_s=self.lost_s(now_s),
             low_battery_s=0.0 if low_s is None else now_s - low_s,
             battery_problem=self._battery_problem,
             height_m=self.height_m(ground_m),
-            distance_m=distance_m,
+            distance_m=max((math.hypot(*way) for way in ways), default=0.0),
             command_age_s=now_s - self.command_s,
             waiting_age_s=now_s - max(self.command_s, self._idle_s),
         )

@@ -2,9 +2,9 @@
 
 1. A pilot or another station changes the mode, or moves the sticks: stop sending (taken over).
 2. The link is lost: stop sending, heartbeats included, so that the autopilot's own failsafe acts.
-3. The estimate jumps, stays away or does not count, the battery is low, or a limit of height or
-   distance is crossed: land.
-4. The estimate is late or does not count: hover.
+3. The estimate jumps, stays away or does not count, nobody localizes the vehicle for long, the
+   battery is low, or a limit of height or distance is crossed: land.
+4. The estimate is late or does not count, or the vehicle is not localized: hover.
 5. No velocity command: hover after 0.5 s, land after 5 s.
 
 ``danger`` tests them in this order and returns the first.
@@ -23,6 +23,10 @@ COMMAND_HOVER_S = 0.5
 COMMAND_LAND_S = 5.0
 ESTIMATE_HOVER_S = 0.5
 ESTIMATE_LAND_S = 2.0
+LOST_HOVER_S = 1.0
+LOST_LAND_S = 10.0
+"""A vehicle that is not localized drifts while it hovers: ArduPilot's velocity was recorded to be
+wrong by up to 0.036 m/s."""
 SILENT_S = 1.0
 """The link is lost when nothing has come from the vehicle for this long."""
 HEARTBEAT_S = 3.5
@@ -76,10 +80,12 @@ class FlightView:
         estimate_age_s: Age of the last estimate that counts.
         estimate_problem: What is missing.
         jump_m: Jump of the estimate, 0 if there was none.
+        lost_s: Age of the last transform of the localization; 0 without one.
         low_battery_s: How long the battery has been low.
         battery_problem: Why it counts as low.
         height_m: Height above the place of take-off.
-        distance_m: Horizontal distance from the place of take-off.
+        distance_m: Horizontal distance from the place of take-off, the larger one of those in the
+            odometry frame and in ``map``.
         command_age_s: Age of the last velocity command.
         waiting_age_s: Age of the last command, or of the navigator's last word that it has no goal.
         is_grounded: Whether the vehicle stands on the ground although it should fly.
@@ -94,6 +100,7 @@ class FlightView:
     estimate_age_s: float = 0.0
     estimate_problem: str = "no new estimate"
     jump_m: float = 0.0
+    lost_s: float = 0.0
     low_battery_s: float = 0.0
     battery_problem: str = "battery low"
     height_m: float = 0.0
@@ -151,6 +158,8 @@ def _must_land(view: FlightView, limits: Limits) -> str:
         return f"the estimated position jumped by {view.jump_m:.2f} m"
     if view.estimate_age_s > ESTIMATE_LAND_S:
         return f"{view.estimate_problem} for {ESTIMATE_LAND_S:g} s"
+    if view.lost_s > LOST_LAND_S:
+        return f"not localized for {LOST_LAND_S:g} s"
     if view.low_battery_s > BATTERY_S:
         return view.battery_problem
     if view.height_m > limits.height_m:
@@ -161,8 +170,9 @@ def _must_land(view: FlightView, limits: Limits) -> str:
 
 
 def _must_hover(view: FlightView, _: Limits) -> str:
-    late = view.estimate_age_s > ESTIMATE_HOVER_S
-    return f"{view.estimate_problem} for {ESTIMATE_HOVER_S:g} s" if late else ""
+    if view.estimate_age_s > ESTIMATE_HOVER_S:
+        return f"{view.estimate_problem} for {ESTIMATE_HOVER_S:g} s"
+    return f"not localized for {LOST_HOVER_S:g} s" if view.lost_s > LOST_HOVER_S else ""
 
 
 def _never_commanded(view: FlightView, _: Limits) -> str:

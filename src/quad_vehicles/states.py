@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Callable, Dict, List, Optional
+from typing import Callable, Dict, List, Optional, Tuple
 
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.topics.vehicle_states import IN_FLIGHT, ON_GROUND, State
@@ -46,6 +46,7 @@ class VehicleMachine:
         state: Present state.
         reason: Why it is in this state, for people; "" if that is plain.
         odom_from_start: Where the vehicle stood before the last take-off.
+        map_from_start: The same in ``map``, if a localization knew it.
         ground_m: Height of that place in the odometry frame.
         altitude_m: Flying altitude above it.
         refusal: Why the last take-off or resumption was given up before it took effect.
@@ -53,12 +54,18 @@ class VehicleMachine:
     """
 
     def __init__(
-        self, altitude_m: float, limits: Limits, traits: Traits, permissions: Permissions
+        self,
+        altitude_m: float,
+        limits: Limits,
+        traits: Traits,
+        permissions: Permissions,
+        localizer: str = "",
     ) -> None:
-        """Start without a link."""
-        self.inputs = Inputs(limits)
+        """Start without a link; ``localizer`` is that of ``Inputs``."""
+        self.inputs = Inputs(limits, localizer)
         self.state, self.reason = State.NO_LINK, "no heartbeat yet"
         self.odom_from_start: Optional[Pose2D] = None
+        self.map_from_start: Optional[Pose2D] = None
         self.ground_m, self.refusal = 0.0, ""
         self.altitude_m, self._limits = altitude_m, limits
         self.traits, self._permissions = traits, permissions
@@ -86,6 +93,7 @@ class VehicleMachine:
         estimate = self.inputs.estimate
         assert estimate is not None  # otherwise not ready
         self.odom_from_start = estimate.odom_from_base.to_2d()
+        self.map_from_start = self.inputs.map_from_base()
         self.ground_m = estimate.odom_from_base.z_m
         self.inputs.begin_flight(now_s)
         self._enter(State.ARMING, "", now_s)
@@ -183,7 +191,7 @@ class VehicleMachine:
             self._enter(State.HOLDING, found.reason, now_s)
 
     def _view(self, now_s: float) -> FlightView:
-        view = self.inputs.view(now_s, self.odom_from_start, self.ground_m)
+        view = self.inputs.view(now_s, self._ways(), self.ground_m)
         if self.state in (State.FLYING, State.HOLDING):
             view = replace(view, is_grounded=self.inputs.landed is Landed.ON_GROUND)
         else:  # commands count only in flight
@@ -340,17 +348,14 @@ class VehicleMachine:
 
     def commanded_velocity(self, now_s: float) -> Velocity:
         """Return the set-point for the last command, slowed down at the limit of distance."""
-        twist, estimate = self.inputs.command, self.inputs.estimate
-        if estimate is None or self.odom_from_start is None:
-            return self._velocity(twist, now_s)
-        pose, start = estimate.odom_from_base.to_2d(), self.odom_from_start
-        vx, vy = inside_fence(
-            pose.rotate(twist.vx_mps, twist.vy_mps),
-            (pose.x_m - start.x_m, pose.y_m - start.y_m),
-            self._limits.radius_m,
-        )
-        vx, vy = Pose2D(0.0, 0.0, -pose.yaw_rad).rotate(vx, vy)
-        return self._velocity(Twist2D(vx, vy, twist.vyaw_radps), now_s)
+        twist = self.inputs.command
+        velocity = twist.vx_mps, twist.vy_mps
+        for way in self._ways():
+            velocity = inside_fence(velocity, way, self._limits.radius_m)
+        return self._velocity(Twist2D(*velocity, twist.vyaw_radps), now_s)
+
+    def _ways(self) -> List[Tuple[float, float]]:
+        return self.inputs.ways(self.odom_from_start, self.map_from_start)
 
     _STEPS: Dict[State, Callable[[VehicleMachine, float], Optional[Velocity]]] = {
         State.NO_LINK: _in_no_link,

@@ -1,6 +1,8 @@
 """Files of vehicles: what flies instead of the simulator.
 
     roof: true                     # indoors (default): an autopilot that would climb is refused
+    localization: fixed            # who publishes map -> odom{i}: fixed, amcl, slam or none
+    map: hall.yaml                 # of amcl: a map of map_server, a scene or a world
     vehicles:
       - number: 0                  # robot 0: /cmd_vel0, /odom0, /scan0
         kind: mavlink              # mavlink, crazyflie or simulated
@@ -21,11 +23,12 @@
         link_lost: falls           # it has no other failsafe; required
         lidar: {multiranger: true}
 
-``map -> odom{i}`` is found in one of three ways: ``start``, from which the frame is computed at
-take-off; ``odom: [x, y, z, yaw]``, a fixed pose; or ``localisation: true``, another node publishes
-the transform. A LIDAR is a driver's ``topic``, or ``obstacle_distance: true`` for MAVLink's
-message, or ``multiranger: true`` for the Crazyflie's deck; without ``lidar`` another node publishes
-``/scan{i}``.
+With ``localization: fixed`` the bridge publishes ``map -> odom{i}``, which follows from ``start``
+at take-off, or is the pose ``odom: [x, y, z, yaw]``. ``amcl`` and ``slam`` begin at ``start``; with
+``none`` another node publishes the transform. ``map`` is relative to the file's folder. Vehicles of
+kind ``simulated`` know their places. A LIDAR is a driver's ``topic``, or ``obstacle_distance:
+true`` for MAVLink's message, or ``multiranger: true`` for the Crazyflie's deck; without ``lidar``
+another node publishes ``/scan{i}``.
 
 A file with a fault is refused as a whole; the ``InputError`` lists every fault.
 """
@@ -46,6 +49,8 @@ from quad_vehicles.telemetry import Limits
 KINDS = ("mavlink", "crazyflie", "simulated")
 AUTOPILOTS = ("ardupilot", "px4")
 FAILSAFES = ("check", "set")
+FIXED, AMCL, SLAM, NONE = "fixed", "amcl", "slam", "none"
+LOCALIZATIONS = (FIXED, AMCL, SLAM, NONE)
 LINK_LOST = "falls"
 LINK_LOST_PROBLEM = (
     "a crazyflie that hears nothing stops its motors after 2 s, and nothing else can be set;"
@@ -63,7 +68,6 @@ _KEYS = [
     "altitude",
     "start",
     "odom",
-    "localisation",
     "limits",
     "lidar",
     "failsafes",
@@ -122,10 +126,12 @@ class Vehicle:
         altitude_m: Flying altitude above the place of take-off.
         limits: Limits that the bridge enforces.
         lidar: Source of the scans; None if another node publishes them.
-        map_from_start: Where it stands in ``map`` at take-off; None for another way.
+        map_from_start: Where it stands in ``map`` at take-off; None if nobody says so.
         map_from_odom: Fixed pose of the odometry frame; None for another way.
         sets_failsafes: Whether the bridge writes the failsafes' parameters.
         bridge_system: MAVLink's number of the bridge.
+        localization: One of ``LOCALIZATIONS``.
+        map_file: File of amcl's map; "" for that of the scene.
     """
 
     number: int
@@ -142,6 +148,8 @@ class Vehicle:
     map_from_odom: Optional[Pose3D] = None
     sets_failsafes: bool = False
     bridge_system: int = OUR_SYSTEM
+    localization: str = FIXED
+    map_file: str = ""
 
     @property
     def name(self) -> str:
@@ -183,14 +191,19 @@ def vehicles_from_document(
         InputError: The document has faults; lists all of them.
     """
     check = Checker(source)
-    fields = check.mapping(document, "", ["roof", "vehicles"])
+    fields = check.mapping(document, "", ["roof", "localization", "map", "vehicles"])
     vehicles: List[Vehicle] = []
     if fields is not None:
-        has_roof = _flag(check, fields, "roof", "", True)
+        localization = _choice(check, fields, "localization", "", LOCALIZATIONS, FIXED)
+        common = {
+            "has_roof": _flag(check, fields, "roof", "", True),
+            "localization": localization,
+            "map_file": _read_map(check, fields, localization),
+        }
         entries = check.sequence(fields, "vehicles")
         if not 0 < len(entries) <= MAX_VEHICLES and not check.problems:
             check.fault("vehicles", f"{len(entries)} vehicles, expected 1 to {MAX_VEHICLES}")
-        found = [_read_vehicle(check, entry, k, has_roof) for k, entry in enumerate(entries)]
+        found = [_read_vehicle(check, entry, k, common) for k, entry in enumerate(entries)]
         vehicles = [vehicle for vehicle in found if vehicle is not None]
         _check_numbers(check, found)
         check_addresses(check, [vehicle.address if vehicle else "" for vehicle in found])
@@ -200,7 +213,21 @@ def vehicles_from_document(
     return tuple(sorted(vehicles, key=lambda vehicle: vehicle.number))
 
 
-def _read_vehicle(check: Checker, entry: Any, index: int, has_roof: bool) -> Optional[Vehicle]:
+def _read_map(check: Checker, fields: Dict[str, Any], localization: str) -> str:
+    if "map" not in fields:
+        return ""
+    text = check.text(fields, "map", "", "")
+    path = Path(check.source).parent / Path(text).expanduser()
+    if localization != AMCL:
+        check.fault("map", f"given with localization {localization}, expected {AMCL}")
+    elif text and not path.is_file():
+        check.fault("map", f"{path} is no file, expected a map, a scene or a world")
+    return str(path)
+
+
+def _read_vehicle(
+    check: Checker, entry: Any, index: int, common: Dict[str, Any]
+) -> Optional[Vehicle]:
     place = f"vehicles[{index}]"
     fields = check.mapping(entry, place, _KEYS)
     if fields is None:
@@ -215,7 +242,7 @@ def _read_vehicle(check: Checker, entry: Any, index: int, has_roof: bool) -> Opt
         check.fault(f"{place}.altitude", problem)
     if kind == "crazyflie" and fields.get("link_lost") != LINK_LOST:
         check.fault(f"{place}.link_lost", LINK_LOST_PROBLEM)
-    start, odom = _read_frames(check, fields, place)
+    start, odom = _read_frames(check, fields, place, common["localization"])
     number = _whole(check, fields, "number", place, None, MAX_VEHICLES - 1)
     return Vehicle(
         number,
@@ -224,14 +251,16 @@ def _read_vehicle(check: Checker, entry: Any, index: int, has_roof: bool) -> Opt
         read_address(check, fields, place, kind),
         _whole(check, fields, "system", place, 1, _MAX_SYSTEM),
         _flag(check, fields, "radio", place, True),
-        has_roof,
-        altitude_m,
-        limits,
-        _read_lidar(check, fields.get("lidar"), f"{place}.lidar", kind),
-        start,
-        odom,
-        _choice(check, fields, "failsafes", place, FAILSAFES, "check") == "set",
-        _whole(check, fields, "bridge_system", place, OUR_SYSTEM - number, _MAX_SYSTEM),
+        altitude_m=altitude_m,
+        limits=limits,
+        lidar=_read_lidar(check, fields.get("lidar"), f"{place}.lidar", kind),
+        map_from_start=start,
+        map_from_odom=odom,
+        sets_failsafes=_choice(check, fields, "failsafes", place, FAILSAFES, "check") == "set",
+        bridge_system=_whole(
+            check, fields, "bridge_system", place, OUR_SYSTEM - number, _MAX_SYSTEM
+        ),
+        **common,
     )
 
 
@@ -253,16 +282,18 @@ def _read_limits(check: Checker, value: Any, place: str) -> Limits:
 
 
 def _read_frames(
-    check: Checker, fields: Dict[str, Any], place: str
+    check: Checker, fields: Dict[str, Any], place: str, localization: str
 ) -> Tuple[Optional[Pose2D], Optional[Pose3D]]:
-    """Return the pose at the start and the fixed pose of the frame, of which one is None."""
-    is_localised = _flag(check, fields, "localisation", place, False)
-    given: List[str] = [key for key in ("start", "odom") if key in fields]
-    if is_localised:
-        given.append("localisation")
-    if len(given) != 1 and fields.get("kind") != "simulated":
-        what = " and ".join(given) or "none"
-        check.fault(place, f"{what} given, expected one of start, odom, localisation: true")
+    """Return the pose at the start and the fixed pose of the frame, None for what is not given."""
+    is_simulated = fields.get("kind") == "simulated"
+    if is_simulated and localization == SLAM:
+        check.fault(f"{place}.kind", f"simulated with localization {SLAM}, expected a real vehicle")
+    given = [key for key in ("start", "odom") if key in fields]
+    allowed = ("start", "odom") if localization == FIXED else ("start",)
+    is_sound = len(given) == 1 and given[0] in allowed
+    if not (is_sound or is_simulated or (localization == NONE and not given)):
+        what = f"{' and '.join(given) or 'none'} given with localization {localization}"
+        check.fault(place, f"{what}, expected {' or '.join(allowed)}")
         return None, None
     if "start" in fields:
         x_m, y_m, yaw_rad = check.numbers(fields, "start", place, 3)
@@ -345,8 +376,7 @@ def _flag(check: Checker, fields: Dict[str, Any], key: str, place: str, default:
     value = fields.get(key, default)
     if isinstance(value, bool):
         return value
-    where = f"{place}.{key}" if place else key
-    check.fault(where, f"{describe(value)}, expected true or false")
+    check.fault(_at(place, key), f"{describe(value)}, expected true or false")
     return default
 
 
@@ -361,5 +391,9 @@ def _choice(
     value = fields.get(key, default or None)
     if value in names:
         return str(value)
-    check.fault(f"{place}.{key}", f"{describe(value)}, expected {' or '.join(names)}")
+    check.fault(_at(place, key), f"{describe(value)}, expected {' or '.join(names)}")
     return names[0]
+
+
+def _at(place: str, key: str) -> str:
+    return f"{place}.{key}" if place else key

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import yaml
 
+from quad_localization import start
 from quad_localization.map_files import read_map, save_map
 from quad_nav.costmap.static import StaticMap
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
+from quad_nav.geometry import Pose2D
 from quad_nav.grid import GridSpec
+from quad_nav.scenario.random_mission import random_mission
+from quad_nav.scenario.scene_map import scene_map
 
 CELLS = np.array([[0, 100, -1, 0], [-1, 0, 100, 100], [0, 0, 0, -1]], np.int8)
 
@@ -67,3 +74,33 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=r"file/map: .*expected a place for a map"):
         save_map(StaticMap(CELLS, GridSpec(4, 3, 0.05)), tmp_path / "file" / "map")
+
+
+RANDOM = {"robots": 3, "seed": 7, "size": 14.0}
+
+
+def test_amcl_begins_where_the_simulator_starts(capsys):
+    options = [f"--{name}={value}" for name, value in RANDOM.items()]
+    assert start.main(["--scene", "random", *options]) == 0
+    expected = random_mission(3, 7, 14.0).scene.starts
+    found = yaml.safe_load(capsys.readouterr().out)
+    assert [Pose2D(*found[f"quad{k}"]) for k in range(3)] == list(expected)
+    assert start.main(["--scene", "no file", *options]) == 0
+    assert yaml.safe_load(capsys.readouterr().out) == {}, "the simulator tells the fault"
+
+
+def test_map_server_draws_the_random_mission_s_scene():
+    pytest.importorskip("quad.msg", reason="needs ROS and `make workspace`")
+    from ros.fake_ros import FakePublisher, FakeRos
+
+    from quad_localization.ros.map_server import MapServer
+
+    with FakeRos("/map_server") as ros:
+        ros._parameters.update({f"~{name}": value for name, value in RANDOM.items()})
+        MapServer(Path("random"), 0.1, "map")
+        grid = FakePublisher.all["/map"].last
+        expected = scene_map(random_mission(3, 7, 14.0).scene, 0.1).occupancy
+        assert list(grid.data) == expected.ravel().tolist()
+        ros._parameters["~robots"] = 0
+        with pytest.raises(InputError, match="map_server: robots: is 0; expected a whole number"):
+            MapServer(Path("random"), 0.1, "map")

@@ -16,6 +16,7 @@ from quad_nav.sim.casters import kernel_lidars
 from quad_nav.sim.flight import BodyState
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.odometry import Odometry, OdometryErrors
+from quad_nav.sim.robot_state import RobotStates
 from quad_nav.sim.scene_file import load_scene
 
 
@@ -46,14 +47,21 @@ class Ways:
         """Return its true pose."""
         return Pose2D(*self.poses[robot].tolist())
 
-    def add_scan(self, slam, robot):
-        """Hand a scan of a robot's LIDAR to ``slam``."""
+    def scan(self, robot):
+        """Return a scan of a robot's LIDAR."""
+        return self._lidars.scan(self.states().bodies, [robot], self._now_s)[0]
+
+    def states(self):
+        """Return what the simulation knows."""
         rows = np.zeros((len(self.poses), 13))
         rows[:, :2], rows[:, 2] = self.poses[:, :2], self.scene.altitude_m
         rows[:, 3:7] = [quaternion_from_yaw(yaw) for yaw in self.poses[:, 2]]
-        scan = self._lidars.scan(BodyState(rows), [robot], self._now_s)[0]
+        return RobotStates(BodyState(rows), self.odometry.frames)
+
+    def add_scan(self, slam, robot):
+        """Hand a scan of a robot's LIDAR to ``slam``."""
         here = self.odom(robot)
-        return slam.add_scan(robot, scan, here, lidar_at(here))
+        return slam.add_scan(robot, self.scan(robot), here, lidar_at(here))
 
 
 def lidar_at(pose):

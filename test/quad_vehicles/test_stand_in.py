@@ -18,7 +18,7 @@ from vehicles.px4 import HOLD, INT32, LAND, OFFBOARD, REJECTED, Px4
 from vehicles.stand_in import ACCEPTED, IN_AIR, ON_GROUND, TAKING_OFF
 from vehicles.virtual_flight import Flight
 
-from quad_nav.geometry import Pose2D
+from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.sim.obstacles import Box
 from quad_nav.sim.scene import Scene, Walls
 from quad_nav.topics.vehicle_states import State
@@ -242,3 +242,16 @@ def test_the_bridge_waits_for_the_position():
     assert flight.state is State.NOT_READY and "no position estimate" in flight.machine.reason
     flight.until_state(State.READY, 15.0)
     assert flight.vehicle.boot_s == pytest.approx(42.4, abs=0.6)
+
+
+def test_a_stand_in_without_a_receiver_drifts_as_the_recorded_velocity():
+    """0.0255 m/s in the body's frame, so that it is off in its own estimate and in place."""
+    flight = Flight().to_hover()
+    flight.command = Twist2D()
+    flight.vehicle.estimator.drifts = True
+    flight.run(15.0)  # of which the first seconds build it up
+    before, told = flight.bodies.pose(0), flight.adapter.estimate.odom_from_base
+    flight.run(20.0)
+    after, later = flight.bodies.pose(0), flight.adapter.estimate.odom_from_base
+    assert told.to_2d().distance_to(later.to_2d()) < 0.06, "it hovers by its estimate"
+    assert before.to_2d().distance_to(after.to_2d()) == pytest.approx(20.0 * 0.0255, abs=0.06)

@@ -10,6 +10,7 @@ import yaml
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
+from quad_vehicles import localizers
 from quad_vehicles.addresses import address_problem, share
 from quad_vehicles.vehicle_file import OUR_SYSTEM, load_vehicles, vehicles_from_document
 
@@ -26,6 +27,11 @@ vehicles:
      altitude: 1.5, radio: false, failsafes: set, limits: {speed: 0.4, battery: 0.3}}
   - {number: 2, kind: simulated}
 """
+
+
+LOCALIZED = """
+vehicles:
+  - {number: 0, kind: mavlink, address: "udpin:127.0.0.1:14551", start: [1.5, 1.5, 0]}"""
 
 
 def read(text):
@@ -65,7 +71,7 @@ vehicles:
         "v.yaml: vehicles[0].address: ''",
         "v.yaml: vehicles[1].limits.battery: 20, expected a share from 0 to 1",
         "v.yaml: vehicles[1].altitude: -1, expected a number above 0",
-        "v.yaml: vehicles[1]: none given, expected one of start, odom, localisation: true",
+        "v.yaml: vehicles[1]: none given with localization fixed, expected start or odom",
         "v.yaml: vehicles[1].system: 255, expected a whole number, 1 to 254",
     ]
     assert len(found) == len(expected)
@@ -79,12 +85,80 @@ vehicles:
         (("number: 1", "number: 5"), "numbers [0, 2, 5], expected each of 0 to 2 once"),
         (("14551", "14552"), "two vehicles have the address udpin:127.0.0.1:14552"),
         (("altitude: 1.5", "altitude: 2.4"), "expected 0.3 m or more below limits.height"),
-        (("start: [1, 2, 3]", "start: [1, 2, 3], localisation: true"), "start and localisation"),
+        (("start: [1, 2, 3]", "start: [1, 2, 3], odom: [0, 0, 0, 0]"), "start and odom given"),
         (("obstacle_distance: true", "mount: [0, 0, 0, 0]"), "expected one of topic"),
     ],
 )
 def test_fault(change, text):
     assert any(text in line for line in faults(GOOD.replace(*change)))
+
+
+@pytest.mark.parametrize(
+    "text, change, fault",
+    [
+        ("localization: gps", (), "localization: 'gps', expected fixed or amcl or slam or none"),
+        ("localization: slam\nmap: v.yaml", (), "map: given with localization slam, expected amcl"),
+        ("localization: amcl\nmap: no.yaml", (), "map: no.yaml is no file, expected a map, a"),
+        (
+            "localization: amcl",
+            ("start: [1.5, 1.5, 0]", "odom: [0, 0, 0, 0]"),
+            "vehicles[0]: odom given with localization amcl, expected start",
+        ),
+        (
+            "localization: slam",
+            (", start: [1.5, 1.5, 0]", ""),
+            "vehicles[0]: none given with localization slam, expected start",
+        ),
+        (
+            "localization: none",
+            ("start: [1.5, 1.5, 0]", "odom: [0, 0, 0, 0]"),
+            "vehicles[0]: odom given with localization none, expected start",
+        ),
+        (
+            "localization: slam",
+            ("number: 0", "number: 1}\n  - {number: 0, kind: simulated}\n  - {number: 2"),
+            "vehicles[1].kind: simulated with localization slam, expected a real vehicle",
+        ),
+    ],
+)
+def test_fault_of_a_localization(text, change, fault):
+    change = change or ("", "")
+    found = faults(f"{text}\n{LOCALIZED.replace(*change)}")
+    assert any(line.startswith(f"v.yaml: {fault}") for line in found), found
+
+
+def test_a_file_with_a_map_beside_it(tmp_path):
+    (tmp_path / "hall.yaml").write_text("")
+    path = tmp_path / "vehicles.yaml"
+    path.write_text(f"localization: amcl\nmap: hall.yaml\n{LOCALIZED}")
+    (vehicle,) = load_vehicles(path)
+    assert (vehicle.localization, vehicle.map_file) == ("amcl", str(tmp_path / "hall.yaml"))
+    assert vehicle.map_from_start == Pose2D(1.5, 1.5, 0.0)
+
+
+@pytest.mark.parametrize(
+    "text, node, expected",
+    [
+        ("fixed", "amcl", None),
+        ("amcl", "slam", None),
+        ("slam", "map_server", None),
+        ("amcl", "map_server", ["room.yaml"]),
+        ("slam", "slam", ["_start0:=[1.5, 1.5, 0.0]"]),
+        (
+            "amcl",
+            "amcl",
+            ["_initial_pose_x:=1.5", "_initial_pose_y:=1.5", "_initial_pose_a:=0.0"],
+        ),
+    ],
+)
+def test_the_localizers_that_a_file_asks_for(text, node, expected):
+    vehicles = read(f"localization: {text}\n{LOCALIZED}")
+    assert localizers.arguments(node, vehicles, "room.yaml", 0) == expected
+
+
+def test_a_simulated_vehicle_has_no_amcl():
+    vehicles = read(f"localization: amcl\n{LOCALIZED}\n  - {{number: 1, kind: simulated}}")
+    assert localizers.arguments("amcl", vehicles, "room.yaml", 1) is None
 
 
 def two(first, second):

@@ -325,6 +325,23 @@ def test_a_start_that_does_not_fit_the_scene_is_a_fault(tmp_path, vehicles, faul
     assert found.startswith(f"{path}: {fault}") or found == fault
 
 
+@pytest.mark.parametrize(
+    "parameters, fault",
+    [
+        ({"localization": "slam"}, "slam, expected amcl, as the file of the vehicles says"),
+        ({"scene": ""}, "amcl, expected map in the file, or a scene"),
+    ],
+)
+def test_parameters_that_contradict_the_file_s_localization(tmp_path, parameters, fault):
+    path = vehicles_file(tmp_path, {**REAL, "start": [1.5, 1.5, 0.0]})
+    path.write_text(f"localization: amcl\n{path.read_text()}")
+    given = {"vehicles": str(path), "scene": str(ARENA), "localization": "amcl"}
+    assert fleet.read_setup(given, "vehicles")
+    with pytest.raises(InputError) as error:
+        fleet.read_setup({**given, **parameters}, "vehicles")
+    assert error.value.problems == [f"vehicles: localization {fault}"]
+
+
 def test_starts_in_the_scene_are_good(tmp_path):
     path = vehicles_file(tmp_path, {**REAL, "start": [1.5, 1.5, 0.0]}, {"kind": "simulated"})
     _, vehicles, scene = fleet.read_setup({"vehicles": str(path), "scene": str(ARENA)}, "vehicles")

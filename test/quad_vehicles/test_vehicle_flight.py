@@ -9,7 +9,7 @@ import pytest
 from vehicles import failures
 from vehicles.virtual_flight import AIRFRAMES, STEP_S, Flight
 
-from quad_nav.geometry import Twist2D
+from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.topics.vehicle_states import State
 from quad_vehicles.orders import Permissions
 
@@ -301,6 +301,64 @@ def test_outward_command_slows_down_before_the_fence(autopilot):
     assert flight.state is State.FLYING
     distance_m = math.hypot(*flight.bodies.place(0)[:2])
     assert 1.7 < distance_m < 2.0
+
+
+PLACE = Pose2D(4.0, 5.0, 0.3)
+
+
+def localized(**limits):
+    """A flight whose place amcl knows."""
+    flight = Flight(localization="amcl", **limits)
+    flight.map_from_odom = PLACE
+    return flight
+
+
+def test_a_vehicle_that_is_not_localized_does_not_take_off():
+    flight = Flight(localization="amcl")
+    assert not flight.run(10.0, lambda: flight.state is State.READY)
+    assert flight.machine.reason == "not localized: no transform map -> odom from amcl"
+    assert not flight.machine.take_off(flight.now_s).is_accepted
+    flight.map_from_odom = PLACE
+    flight.to_hover()
+    flight.machine.land(flight.now_s, "test")
+    flight.until_state(State.LANDED, 20.0)
+    flight.map_from_odom = None
+    flight.until_state(State.NOT_READY, 2.0)
+
+
+def test_a_vehicle_that_is_lost_hovers_and_flies_on_when_it_is_localized():
+    flight = localized().to_flight()
+    flight.map_from_odom = None
+    flight.run(1.2)
+    assert (flight.state, flight.machine.reason) == (State.HOLDING, "not localized for 1 s")
+    assert flight.run(4.0, lambda: flight.speed_mps < 0.05)
+    flight.map_from_odom = PLACE
+    flight.until_state(State.FLYING, 0.1)
+
+
+def test_a_vehicle_that_is_lost_for_long_lands_before_it_drifts_far():
+    flight = localized().to_flight()
+    flight.map_from_odom = None
+    flight.until_state(State.LANDING, 10.2)
+    assert flight.machine.reason == "not localized for 10 s"
+
+
+def test_the_limit_of_distance_counts_in_map():
+    """Odometry drifts toward the start as fast as the vehicle flies away: it sees no distance."""
+    flight = localized(radius_m=2.0).to_flight()
+    start, before = flight.machine.map_from_start, flight.machine.inputs.map_from_base()
+    x, y = before.x_m - start.x_m, before.y_m - start.y_m
+    away_m = math.hypot(x, y)
+    shift = (2.1 - away_m) / away_m
+    flight.map_from_odom = Pose2D(PLACE.x_m + shift * x, PLACE.y_m + shift * y, PLACE.yaw_rad)
+    flight.until_state(State.LANDING, 0.1)
+    assert "m from take-off, the limit is 2 m" in flight.machine.reason
+
+
+def test_an_outward_command_slows_down_before_the_limit_in_map():
+    flight = localized(radius_m=2.0).to_flight()
+    flight.run(6.0)
+    assert flight.state is State.FLYING and flight.speed_mps < 0.1
 
 
 def test_a_navigator_that_waits_keeps_the_vehicle_in_the_air(autopilot):

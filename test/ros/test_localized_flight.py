@@ -9,7 +9,7 @@ import numpy as np
 import rospy
 import rostest
 import tf2_ros
-from flight_case import FlightCase, Record
+from flight_case import FlightCase, Record, trigger
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from std_msgs.msg import String
@@ -22,6 +22,12 @@ from quad_nav.sim.scene_file import load_scene
 from quad_web.ros.actions import FlightActions
 from quad_web.ros.source import FlightSource
 from quad_web.view.state import LAYERS, FleetState, Wanted
+
+
+def drift_of(buffer, robot):
+    """Return how far a robot's odometry frame is from `map`."""
+    place = buffer.lookup_transform("map", f"odom{robot}", rospy.Time(0)).transform.translation
+    return math.hypot(place.x, place.y) + abs(place.z)
 
 
 class LocalizedFlight(FlightCase):
@@ -37,16 +43,15 @@ class LocalizedFlight(FlightCase):
         self.assertEqual([goal["reached"] for goal in goals], 6 * [True], goals)
         self.assertEqual(result["contacts"], [])
         for i in (0, 1):
-            frame = buffer.lookup_transform("map", f"odom{i}", rospy.Time(0)).transform
-            drift_m = math.hypot(frame.translation.x, frame.translation.y)
+            drift_m = drift_of(buffer, i)
             self.assertGreater(drift_m, 0.1, "odometry has drifted, and somebody corrects it")
-            self.assertAlmostEqual(frame.translation.z, 0.0)
             self.assertGreater(len(poses[i].messages), 50)
         self.wait(lambda: summaries.messages[-1].data, "the summary")
         self.assertEqual(json.loads(summaries.messages[-1].data), result)
         self.listener.unregister()  # the page reads /tf in a form of its own
         self.check_page(name, poses[0])
         self.check_map(map_from_message(maps.messages[-1]))
+        self.check_reset(poses)
 
     def check_page(self, name, poses):
         """The page shows the result and who is where, and takes a pose for a robot that hovers."""
@@ -78,6 +83,18 @@ class LocalizedFlight(FlightCase):
             return any(one.pose.covariance[0] > 1.0 for one in poses.messages[count:])
 
         self.wait(is_spread, "particles all over the map")
+
+    def check_reset(self, poses):
+        """After a reset robots are where they started, by odometry that begins anew."""
+        counts = [len(record.messages) for record in poses]
+        trigger("/simulation/reset")
+        for i, start in enumerate(load_scene(shipped("scenes", "arena.yaml")).starts):
+
+            def has_begun_anew(i=i, start=start):
+                found = (pose_from_message(one.pose.pose) for one in poses[i].messages[counts[i] :])
+                return any(pose.to_2d().distance_to(start) < 0.06 for pose in found)
+
+            self.wait(has_begun_anew, f"robot {i} at its start")
 
     def check_map(self, grid):
         """The occupied cells are on the scene's surfaces, to within two cells."""

@@ -1,4 +1,12 @@
-"""A stand-in's estimate of its pose: its own local frame, drift, and faults."""
+"""A stand-in's estimate of its pose: its own local frame, drift, and faults.
+
+Without a position from outside an autopilot integrates its velocity. The recorded one's (ArduCopter
+4.5.3) is wrong by 0.024 m/s, root mean square of 57 pieces of 3 s in seven recordings, 0.038 m/s at
+most: its integral is 0.27 m off after the 50 s of `velocity_steps`, 0.47 m after the 42 s of
+`random_commands`, 0.30 m after the 14 s of `start_to_hover`, measured against the position, which
+GPS held. The error is 0.018 m/s to the back and as much to the right, and follows turns within 3 s:
+so much explains the two long recordings to 0.07 m. The heading did not drift.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +20,7 @@ GROUND_OFFSET_M = -0.035
 """Height that the recorded autopilot reports while it stands on the ground."""
 _DRIFT_S, _POSITION_SD_M, _HEIGHT_SD_M, _VELOCITY_SD_MPS = 20.0, 0.005, 0.005, 0.006
 DRIFT_MPS2 = 2.0 * 0.63 / 8.0**2  # 0.63 m off after 8 s without GPS
+VELOCITY_ERROR_MPS, _ERROR_S = 0.018 * math.sqrt(2.0), 3.0
 _BARO_S = 1.2  # within this time the estimate follows an error of the barometer
 
 
@@ -39,6 +48,8 @@ class Estimator:
         baro_error_m: Fault: an error of the barometer, which the estimate follows.
         is_lost: Whether there is no position any more.
         is_dead_reckoning: Fault: nothing corrects the position, and the vehicle drifts unseen.
+        drifts: Whether the position is the integral of the velocity with its recorded error, in a
+            direction of the seed.
     """
 
     def __init__(self, bodies, robot, frame, seed):
@@ -50,9 +61,9 @@ class Estimator:
         self._noise = [0.0] * 7
         self._baro_m = 0.0
         self.is_frozen, self.jump_m, self.baro_error_m = False, (0.0, 0.0, 0.0), 0.0
-        self.is_lost = self.is_dead_reckoning = False
+        self.is_lost = self.is_dead_reckoning = self.drifts = False
         self._drift_yaw_rad = self._random.uniform(-math.pi, math.pi)
-        self._drift_mps, self._drift_m = 0.0, 0.0
+        self._drift_mps, self._drift_m = (0.0, 0.0), (0.0, 0.0)
         self._held = None
 
     def step(self, seconds):
@@ -71,15 +82,17 @@ class Estimator:
 
     def _drift(self, seconds):
         """Move away from where the estimate is; with a receiver the error is gone at once."""
-        if self.is_dead_reckoning:
-            self._drift_mps += DRIFT_MPS2 * seconds
-            self._drift_m += self._drift_mps * seconds
+        if self.drifts:
+            yaw_rad = self._bodies.pose(self._robot).yaw_rad + self._drift_yaw_rad
+            wanted, share = _along(yaw_rad, VELOCITY_ERROR_MPS), seconds / _ERROR_S
+            self._drift_mps = tuple(v + (w - v) * share for v, w in zip(self._drift_mps, wanted))
+        elif self.is_dead_reckoning:
+            size = math.hypot(*self._drift_mps) + DRIFT_MPS2 * seconds
+            self._drift_mps = _along(self._drift_yaw_rad, size)
         else:
-            self._drift_mps = self._drift_m = 0.0
-        self._bodies.drift_mps[self._robot] = self._along_drift(self._drift_mps)
-
-    def _along_drift(self, size):
-        return size * math.cos(self._drift_yaw_rad), size * math.sin(self._drift_yaw_rad)
+            self._drift_mps = self._drift_m = (0.0, 0.0)
+        self._drift_m = tuple(m + v * seconds for m, v in zip(self._drift_m, self._drift_mps))
+        self._bodies.drift_mps[self._robot] = self._drift_mps
 
     @property
     def height_m(self):
@@ -115,7 +128,7 @@ class Estimator:
 
     def _position(self):
         pose = self._bodies.pose(self._robot)
-        drift_x, drift_y = self._along_drift(self._drift_m)
+        drift_x, drift_y = self._drift_m
         north, east = self.ned(
             pose.x_m - self._start.x_m - drift_x, pose.y_m - self._start.y_m - drift_y
         )
@@ -128,7 +141,7 @@ class Estimator:
 
     def _velocity(self):
         x, y, z = self._bodies.velocity_mps(self._robot)
-        drift_x, drift_y = self._along_drift(self._drift_mps)
+        drift_x, drift_y = self._drift_mps
         north, east = self.ned(x - drift_x, y - drift_y)
         return (north + self._noise[3], east + self._noise[4], -z + self._noise[5])
 
@@ -143,6 +156,10 @@ class Estimator:
     def _rates(self):
         forward, left, up = self._bodies.turn_radps(self._robot)
         return (forward, -left, -up + self._noise[6])
+
+
+def _along(yaw_rad, size):
+    return size * math.cos(yaw_rad), size * math.sin(yaw_rad)
 
 
 def ned_from_frd(flu_to_enu):

@@ -4,6 +4,7 @@
 Each sends to its port on this machine, where a bridge listens (`address: udpin:127.0.0.1:PORT`).
 North, east (m) and heading (degrees) are the vehicle's place in its own local frame. With a scene
 the vehicles stand at its start poses, and touch its walls and each other; contacts are printed.
+With `--drift` odometry drifts as recorded, and LIDARs are topics of ROS, see `truth_topics`.
 `--gcs-timeout` is how long ArduPilot waits for a silent ground station.
 KIND is `ardupilot` or `px4`.
 The signal SIGUSR1 changes the mode of the first one, as its pilot would.
@@ -79,6 +80,7 @@ class UdpVehicle:
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--scene", default="")
+    parser.add_argument("--drift", action="store_true")
     parser.add_argument("--gcs-timeout", type=float, default=5.0, metavar="S")
     parser.add_argument("vehicles", nargs="+", metavar="KIND:PORT:NORTH:EAST:HEADING")
     options = parser.parse_args()
@@ -96,7 +98,13 @@ def main():
         UdpVehicle(text, bodies, k, options.gcs_timeout) for k, text in enumerate(options.vehicles)
     ]
     vehicles = [link.vehicle for link in links]
-    first, told = vehicles[0], 0
+    first, told, topics = vehicles[0], 0, None
+    if options.drift:
+        from vehicles.truth_topics import TruthTopics  # it needs ROS
+
+        topics = TruthTopics(scene, bodies)
+        for vehicle in vehicles:
+            vehicle.estimator.drifts = True
     signal.signal(signal.SIGUSR1, lambda *_: first.set_mode(first.kind["other"]))
     next_s = time.monotonic()
     while True:
@@ -105,6 +113,8 @@ def main():
         advance(bodies, vehicles, STEP_S)
         for link in links:
             link.send()
+        if topics is not None:
+            topics.publish()
         for contact in bodies.contacts[told:]:
             print(contact, flush=True)
         told = len(bodies.contacts)

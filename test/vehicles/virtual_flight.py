@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 from vehicles.ardupilot import ArduPilot
@@ -21,11 +22,12 @@ from quad_nav.sim.simulation_params import STEP_S as SIMULATION_STEP_S
 from quad_nav.topics.vehicle_states import State
 from quad_vehicles.autopilots import AUTOPILOTS
 from quad_vehicles.crazyflie_adapter import TRAITS, CrazyflieAdapter
+from quad_vehicles.localizers import name_of
 from quad_vehicles.mavlink_adapter import MavlinkAdapter
 from quad_vehicles.orders import Permissions
 from quad_vehicles.states import VehicleMachine
 from quad_vehicles.telemetry import Limits
-from quad_vehicles.vehicle_file import OUR_SYSTEM, Lidar, Vehicle
+from quad_vehicles.vehicle_file import FIXED, OUR_SYSTEM, Lidar, Vehicle
 
 STEP_S = 2.0 * SIMULATION_STEP_S
 MAY_ARM, AHEAD = Permissions(may_arm=True), Twist2D(0.5, 0.0, 0.0)
@@ -79,7 +81,9 @@ class Bridge:
         """Start the bridge; a second time after it has died, which knows nothing."""
         file = self._file
         traits = AUTOPILOTS[file.autopilot].traits if file.kind == "mavlink" else TRAITS
-        self.machine = VehicleMachine(file.altitude_m, file.limits, traits, self._permissions)
+        self.machine = VehicleMachine(
+            file.altitude_m, file.limits, traits, self._permissions, name_of(file)
+        )
         self.adapter = self.make_adapter(file)
 
     def make_adapter(self, file):
@@ -134,14 +138,23 @@ class Flight:
         is_alive: Whether the bridge works.
         has_station: Whether a ground station is connected beside it.
         command: Twist2D that comes every 50 ms; None for none.
+        map_from_odom: What a localization says at every tick; None while it says nothing.
         sent: What the bridge has sent: (time, name, fields).
     """
 
     def __init__(
-        self, autopilot="ardupilot", permissions=MAY_ARM, seed=0, bodies=None, robot=0, **limits
+        self,
+        autopilot="ardupilot",
+        permissions=MAY_ARM,
+        seed=0,
+        bodies=None,
+        robot=0,
+        localization=FIXED,
+        **limits,
     ):
         self.autopilot, self.bodies = autopilot, bodies or PointBodies()
-        file = vehicle_of(autopilot, **limits)
+        file = replace(vehicle_of(autopilot, **limits), localization=localization)
+        self.map_from_odom = None
         self._bridge = bridge_of(file, self.bodies, robot, seed, permissions)
         self.vehicle = self._bridge.vehicle
         self._vehicles = [self.vehicle]
@@ -206,6 +219,8 @@ class Flight:
 
     def _tick(self):
         messages = []
+        if self.map_from_odom is not None:
+            self.machine.inputs.take_frame(self.map_from_odom, self.now_s)
         if self.command is not None and self.now_s >= self._next_command_s:
             self._next_command_s = self.now_s + 0.05
             messages += self.adapter.follow(self.command, self.now_s)[1]

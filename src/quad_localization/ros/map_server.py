@@ -1,6 +1,7 @@
 """Node `map_server`: publish a map, or the map of a scene.
 
-Topics, services and the parameter `~frame_id` are those of map_server.
+Topics, services and the parameter `~frame_id` are those of map_server. For `random` the scene is
+that of a random mission with the parameters `~robots`, `~seed` and `~size`, as in the simulator.
 """
 
 from __future__ import annotations
@@ -24,12 +25,17 @@ from nav_msgs.srv import (
 
 from quad_localization.map_files import CELL_M, read_map
 from quad_nav.errors import InputError
-from quad_nav.files.values import is_number
+from quad_nav.files.values import is_number, value_faults
 from quad_nav.ros.common.nav_messages import map_message
 from quad_nav.ros.common.readiness import init_node
+from quad_nav.scenario import RANDOM
+from quad_nav.scenario.rules import RULES
+from quad_nav.scenario.scenario import scene_of
+from quad_nav.scenario.scene_map import scene_map
+from quad_nav.sim.scene import Scene
 
 EXIT_BAD_INPUT = 2
-_USAGE = "expected map_server FILE [RESOLUTION]: a map's YAML file, a scene or a Gazebo world"
+_USAGE = "expected map_server FILE [RESOLUTION]: a map's file, a scene, a world or random"
 
 
 class MapServer:
@@ -50,8 +56,11 @@ class MapServer:
         rospy.Service("change_map", LoadMap, self._change)
 
     def _read(self, path: Path) -> OccupancyGrid:
-        found = replace(read_map(path, self._resolution_m), frame=self._frame)
-        return map_message(found, rospy.Time.now())
+        if str(path) == RANDOM:
+            found = scene_map(_random_scene(), self._resolution_m)
+        else:
+            found = read_map(path, self._resolution_m)
+        return map_message(replace(found, frame=self._frame), rospy.Time.now())
 
     def _publish(self) -> None:
         self._grid.publish(self._message)
@@ -71,6 +80,21 @@ class MapServer:
             return LoadMapResponse(result=getattr(LoadMapResponse, code))
         self._publish()
         return LoadMapResponse(self._message, LoadMapResponse.RESULT_SUCCESS)
+
+
+def _random_scene() -> Scene:
+    """Return the scene of the random mission of the node's parameters.
+
+    Raises:
+        InputError: A parameter is not valid, or the arena has no room.
+    """
+    rules = {name: RULES[name] for name in ("robots", "seed", "size")}
+    values = {"robots": 2, "seed": 0, "size": 0.0}
+    values = {name: rospy.get_param(f"~{name}", value) for name, value in values.items()}
+    faults = value_faults(values, rules, "map_server")
+    if faults:
+        raise InputError(faults)
+    return scene_of({"scene": RANDOM, **values})
 
 
 def main() -> int:

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from typing import Callable, Deque, Dict, List, Optional, Tuple
+from typing import Deque, Dict, List, Optional
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import PoseWithCovariance, PoseWithCovarianceStamped, TransformStamped
+from geometry_msgs.msg import PoseWithCovariance, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
-from tf2_msgs.msg import TFMessage
 
+from quad_localization.ros.amcl_robot import SILENT_S
+from quad_localization.ros.reset_watch import ResetWatch
+from quad_localization.ros.transform_topic import TransformTopic
 from quad_localization.slam import Slam, SlamPose
 from quad_localization.warm_up import warm_up_slam
 from quad_nav.errors import excerpt
@@ -36,7 +38,7 @@ from quad_nav.ros.common.nav_messages import map_message
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.topics.health import Health, Level
-from quad_nav.topics.validation import scan_problem, stamp_problem
+from quad_nav.topics.validation import pose_problem, scan_problem, stamp_problem
 
 EXIT_BAD_INPUT = 2
 MAP_PERIOD_S = 1.0
@@ -55,7 +57,7 @@ class SlamRobot:
         self.scans: Deque[LaserScan] = deque(maxlen=_QUEUE)
         self.taken_s = -1.0  # stamp of the last scan that was taken
         self.warnings = ThrottledWarnings()
-        self.pose: Optional[Tuple[Pose2D, str]] = None  # that a person gave
+        self.pose: Optional[Pose2D] = None  # that a person gave
         self.publisher = rospy.Publisher(
             f"/slam_pose{number}", PoseWithCovarianceStamped, queue_size=1
         )
@@ -78,52 +80,50 @@ class SlamRobot:
             self.scans.append(message)
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
-        pose = pose_from_message(message.pose.pose)
-        if not np.isfinite([*pose.translation, *pose.quaternion]).all():
-            self.warnings.warn(f"{self.name}: initial pose dropped: it is not finite")
-            return
-        self.pose = pose.to_2d(), message.header.frame_id
-
-
-class LatestTransforms(rospy.SubscribeListener):
-    """Sends a node that subscribes the latest transforms: a paused simulation sends no others."""
-
-    def __init__(self) -> None:
-        self.by_frame: Dict[str, TransformStamped] = {}
-
-    def peer_subscribe(
-        self, _name: str, _publish: Callable[..., None], peer_publish: Callable[..., None]
-    ) -> None:
-        """Handle a new subscriber."""
-        if self.by_frame:
-            peer_publish(TFMessage(list(self.by_frame.values())))
+        pose, frame = pose_from_message(message.pose.pose), message.header.frame_id.lstrip("/")
+        problem = pose_problem(pose)
+        if frame not in ("", "map"):
+            problem = f"frame '{excerpt(frame)}', expected 'map'"
+        if problem:
+            self.warnings.warn(f"{self.name}: initial pose dropped: {problem}", "pose")
+        else:
+            self.pose = pose.to_2d()
 
 
 class SlamNode:
     """The node: robots, map and transforms."""
 
-    def __init__(self, robots: int, frames: Dict[int, Pose2D]) -> None:
-        self._slam = Slam(frames)
+    def __init__(self, robots: int, starts: Dict[int, Pose2D]) -> None:
+        """Advertise; without a start a robot's odometry frame is ``map``, roughly."""
+        self._starts = starts
         self._lock = threading.Lock()  # the diagnostics have their own thread
         self._robots = [SlamRobot(number) for number in range(robots)]
+        self._begin_map()
         self._transforms = Transforms()
-        self._latest = LatestTransforms()
-        self._tf = rospy.Publisher("/tf", TFMessage, self._latest, queue_size=100)
+        self._tf, self._resets = TransformTopic(), ResetWatch()
         self._map = rospy.Publisher("/map", OccupancyGrid, queue_size=1, latch=True)
         self._map_s, self._now_s = -MAP_PERIOD_S, 0.0
         publish_health(self._health)
 
+    def _begin_map(self) -> None:
+        self._frames = {one.number: Pose2D(0.0, 0.0) for one in self._robots}
+        self._slam = Slam(self._frames)
+
     def spin(self) -> None:
         """Run until ROS shuts down."""
         while not rospy.is_shutdown():
-            self._check_clock()
-            for robot in self._robots:
-                with self._lock:
-                    self._set_pose(robot)
-                    while robot.scans and self._take(robot, robot.scans[0]):
-                        robot.scans.popleft()
-            self._publish_map()
+            self.step()
             rospy.rostime.wallsleep(_POLL_S)
+
+    def step(self) -> None:
+        """Handle what has come: poses and scans whose odometry is known."""
+        self._check_clock()
+        for robot in self._robots:
+            with self._lock:
+                self._set_pose(robot)
+                while robot.scans and self._take(robot, robot.scans[0]):
+                    robot.scans.popleft()
+        self._publish_map()
 
     def _check_clock(self) -> None:
         """Forget the scans of a time that comes again."""
@@ -132,10 +132,22 @@ class SlamNode:
             for robot in self._robots:
                 robot.scans.clear()
             self._map_s = self._now_s - MAP_PERIOD_S
+        if self._resets.pop(self._now_s):
+            self._reset()
+
+    def _reset(self) -> None:
+        """Begin a new map: the simulation is reset."""
+        with self._lock:
+            self._begin_map()
+            self._tf.forget()
+            for robot in self._robots:
+                robot.scans.clear()
+                robot.taken_s, robot.pose = -1.0, None
 
     def _take(self, robot: SlamRobot, message: LaserScan) -> bool:
         """Hand a scan to the map; return False while its odometry may still come."""
         stamp = message.header.stamp
+        self._resets.begin(stamp.to_sec())
         try:
             odom_from_base = self._transforms.lookup(robot.odom, robot.base, stamp)
             odom_from_lidar = self._transforms.lookup(robot.odom, message.header.frame_id, stamp)
@@ -147,8 +159,11 @@ class SlamNode:
             return True
         if stamp.to_sec() == robot.taken_s:
             return True
-        robot.taken_s = stamp.to_sec()
         scan, base = scan_from_message(message), odom_from_base.to_2d()
+        if robot.taken_s < 0.0 and robot.number in self._starts:
+            start = self._starts[robot.number]
+            self._frames[robot.number] = start.compose(base.inverse())
+        robot.taken_s = stamp.to_sec()
         place = self._slam.add_scan(robot.number, scan, base, odom_from_lidar)
         self._publish(robot, place, stamp)
         return True
@@ -159,8 +174,7 @@ class SlamNode:
             return
         ahead = stamp + rospy.Duration(TOLERANCE_S)
         frame = transform_message(place.map_from_odom.to_3d(), "map", robot.odom, ahead)
-        self._latest.by_frame[robot.odom] = frame
-        self._tf.publish(TFMessage([frame]))
+        self._tf.send(frame)
         if place.odom_from_base is not None:
             here = place.map_from_odom.compose(place.odom_from_base).to_3d()
             covariance = covariance_36(place.covariance).tolist()
@@ -168,16 +182,10 @@ class SlamNode:
             robot.publisher.publish(PoseWithCovarianceStamped(Header(0, stamp, "map"), pose))
 
     def _set_pose(self, robot: SlamRobot) -> None:
-        """Take the pose that a person gave."""
-        given, robot.pose = robot.pose, None
-        if given is None:
-            return
-        pose, frame = given
-        if frame.lstrip("/") != "map":
-            text = f"{robot.name}: initial pose dropped: in frame '{excerpt(frame)}', expected map"
-            robot.warnings.warn(text, "frame")
-            return
-        self._slam.set_pose(robot.number, pose)
+        """Take the pose that a person gave, when there was a scan."""
+        if robot.pose is not None and robot.number in self._slam.poses:
+            given, robot.pose = robot.pose, None
+            self._slam.set_pose(robot.number, given)
 
     def _publish_map(self) -> None:
         if self._slam.map.is_empty or self._now_s - self._map_s < MAP_PERIOD_S:
@@ -187,10 +195,14 @@ class SlamNode:
 
     def _health(self) -> List[Health]:
         with self._lock:
-            return [_health_of(one.name, self._slam.poses.get(one.number)) for one in self._robots]
+            now_s, poses = rospy.get_time(), self._slam.poses
+            return [
+                _health_of(one.name, poses.get(one.number), now_s - one.taken_s)
+                for one in self._robots
+            ]
 
 
-def _health_of(name: str, place: Optional[SlamPose]) -> Health:
+def _health_of(name: str, place: Optional[SlamPose], silent_s: float) -> Health:
     part = f"{name}: localization"
     if place is None:
         return Health(part, name, Level.WARN, "no scan with odometry yet")
@@ -198,6 +210,8 @@ def _health_of(name: str, place: Optional[SlamPose]) -> Health:
     values = {"fit": f"{place.fit:.2f}", "standard deviation": f"{across_m:.3f} m"}
     if place.is_lost:
         return Health(part, name, Level.ERROR, "lost: scans do not fit the map", values)
+    if silent_s > SILENT_S:
+        return Health(part, name, Level.WARN, "no scans with odometry", values)
     return Health(part, name, Level.OK, "localized", values)
 
 
@@ -210,14 +224,16 @@ def main() -> int:
     if not is_whole(robots) or robots < 1:
         rospy.logfatal("slam: robots: %s; expected a whole number, at least 1", robots)
         return EXIT_BAD_INPUT
-    frames = {}
+    starts = {}
     for number in range(robots):
-        given = rospy.get_param(f"~odom{number}", [0.0, 0.0, 0.0])
+        given = rospy.get_param(f"~start{number}", None)
+        if given is None:
+            continue
         if not isinstance(given, list) or len(given) != 3 or not all(map(is_number, given)):
             rospy.logfatal(
-                "slam: odom%d: %s; expected its first pose in map, [x, y, yaw]", number, given
+                "slam: start%d: %s; expected its first pose in map, [x, y, yaw]", number, given
             )
             return EXIT_BAD_INPUT
-        frames[number] = Pose2D(*map(float, given))
-    SlamNode(robots, frames).spin()
+        starts[number] = Pose2D(*map(float, given))
+    SlamNode(robots, starts).spin()
     return 0

@@ -70,7 +70,7 @@ class SimulatorSetup:
         rate: Simulated seconds per second.
         configurations: Those of the robots whose navigators are in the simulation's processes, by
             number.
-        localizes: The simulator publishes the poses in ``map``, which only it knows.
+        localization: Who publishes the poses in ``map``.
         hosts: Number of these processes; 0 if nobody chose it.
     """
 
@@ -84,7 +84,7 @@ class SimulatorSetup:
     steps_per_scan: int
     map_resolution_m: float = 0.0
     configurations: Mapping[int, Configuration] = field(default_factory=dict)
-    localizes: bool = True
+    localization: str = SIMULATOR
     hosts: int = 0
 
 
@@ -104,7 +104,7 @@ def read_setup(
         InputError: Every fault in the parameters and in the scene.
     """
     values = _checked_values(parameters, name)
-    scene, localizes = scene_of(values), values["localization"] == SIMULATOR
+    scene, localization = scene_of(values), values["localization"]
     if values["config"]:
         area = area_of(values)
         fleet = read_configurations(values["config"], values["robots"], area, numbered=True)
@@ -122,9 +122,10 @@ def read_setup(
         values["gui"],
         values["start_paused"],
         steps_per_scan(values["lidar_rate"]),
-        float(values["map_resolution"]) if localizes else 0.0,  # who localizes publishes the map
+        # Who localizes publishes the map.
+        float(values["map_resolution"]) if localization == SIMULATOR else 0.0,
         hosted,
-        localizes,
+        localization,
         values["hosts"],
     )
 
@@ -159,11 +160,6 @@ def _hosted(values: Mapping[str, Any]) -> List[int]:
 
 def _host_faults(values: Mapping[str, Any], name: str) -> List[str]:
     count = len(_hosted(values))
-    if count and values["localization"] != SIMULATOR:
-        # They have their poses from the simulation.
-        return [
-            f"{name}: localization {values['localization']} with composed, expected composed:=false"
-        ]
     if not count or values["hosts"] <= count:
         return []
     return [f"{name}: hosts {values['hosts']} for {count} robots; expected a robot for each host"]

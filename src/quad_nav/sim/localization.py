@@ -35,16 +35,20 @@ class Localization(Protocol):
         """Return whether a robot does not know its place."""
 
     def estimate(self, robot: int) -> Optional[Estimate]:
-        """Return where a robot believed itself at its last scan; None before the first one."""
+        """Return where a robot believed itself at its last scan; None if that is not known."""
+        return None
 
     def particles(self, robot: int) -> Optional[NDArray[np.float64]]:
         """Return particles float64[n, 3], poses in ``map``; None if the method has none."""
+        return None
 
     def set_pose(self, robot: int, pose: Pose2D, covariance: NDArray[np.float64]) -> None:
         """Tell a robot where it is in ``map``, as a person sees it; its next scan counts."""
+        raise NotImplementedError
 
     def set_uniform(self, robot: int) -> bool:
         """Let a robot search the whole map; return False if the method cannot."""
+        return False
 
 
 LocalizationMaker = Callable[[Scene, int], Localization]

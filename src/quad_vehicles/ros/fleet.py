@@ -36,10 +36,10 @@ from quad_nav.sim.scene_file import load_scene, outside_problem
 from quad_nav.topics.mission_events import EVENTS_TOPIC, mission_event_from_message
 from quad_nav.topics.vehicle_states import IN_FLIGHT, ON_GROUND, State, state_from_message
 from quad_vehicles.ros.node import LAND_ALL_TOPIC
-from quad_vehicles.ros.scene_topics import SceneLidars, SceneTopics
+from quad_vehicles.ros.scene_topics import PoseListener, SceneLidars, SceneTopics
 from quad_vehicles.ros.topics import call_trigger
 from quad_vehicles.starts import starts_of
-from quad_vehicles.vehicle_file import Vehicle, load_vehicles
+from quad_vehicles.vehicle_file import AMCL, FIXED, LOCALIZATIONS, Vehicle, load_vehicles
 
 READY_WAIT_S = 90.0
 """Longest wait for all vehicles to be ready: a GPS takes 45 s from its start."""
@@ -53,6 +53,7 @@ SILENT_S = 3.0
 _DEFAULTS: Dict[str, Any] = {
     "vehicles": "",
     "scene": "",
+    "localization": "",
     "lidar_for": "none",
     "lidar_rate": 10.0,
     "scan_range": LidarParams().scan_range_rad,
@@ -64,6 +65,7 @@ _DEFAULTS: Dict[str, Any] = {
 _RULES: Dict[str, Rule] = {
     "vehicles": text("the file of the vehicles"),
     "scene": optional(text("a scene's file")),
+    "localization": optional(choice(LOCALIZATIONS)),
     "lidar_for": choice(("none", "vehicles")),
     "lidar_rate": number(above=0.0, at_most=100.0, unit="Hz"),
     "scan_range": number(above=0.0, unit="radians"),
@@ -290,9 +292,31 @@ def read_setup(
         problems.append(f"{name}: lidar_for: vehicles needs a scene")
     if any(one.kind == "simulated" for one in vehicles) and not values["scene"]:
         problems.append(f"{name}: vehicles of kind simulated need a scene")
+    problems += _localization_faults(values, vehicles, name)
     if problems:
         raise InputError(problems)
     return values, vehicles, scene
+
+
+def _localization_faults(
+    values: Mapping[str, Any], vehicles: Sequence[Vehicle], name: str
+) -> List[str]:
+    """Return how the node's parameters contradict the file, which says the same for all."""
+    faults = []
+    for one in vehicles[:1]:
+        if values["localization"] not in ("", one.localization):
+            given = f"{name}: localization {values['localization']}"
+            faults.append(f"{given}, expected {one.localization}, as the file of the vehicles says")
+        if one.localization == AMCL and not (one.map_file or values["scene"]):
+            faults.append(f"{name}: localization amcl, expected map in the file, or a scene")
+    return faults
+
+
+def _poses(vehicles: Sequence[Vehicle]) -> PoseListener:
+    """Listen to the poses of all vehicles."""
+    localized = (one for one in vehicles if one.localization != FIXED and one.kind != "simulated")
+    starts = {one.number: one.map_from_start for one in localized if one.map_from_start}
+    return PoseListener(len(vehicles), starts)
 
 
 def main() -> int:
@@ -317,11 +341,12 @@ def main() -> int:
     sees_scene = values["lidar_for"] == "vehicles"
     scanned = [one.number for one in vehicles if sees_scene or one.kind == "simulated"]
     if scene is not None and scanned:
-        lidars = SceneLidars(scene, len(vehicles), scanned, lidar)
+        poses = _poses(vehicles)
+        lidars = SceneLidars(scene, poses, scanned, lidar)
         from quad_vehicles.ros.simulated import SimulatedVehicles  # it loads the physics engine
 
         try:
-            bodies = SimulatedVehicles(scene, vehicles, sees_scene, time.monotonic())
+            bodies = SimulatedVehicles(scene, vehicles, poses, sees_scene, time.monotonic())
         except InputError as error:
             rospy.logfatal("%s", printable(error, "\n"))
             return 2

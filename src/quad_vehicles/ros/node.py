@@ -6,6 +6,7 @@ machine and sends. A velocity command is sent on from the callback that receives
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
 import time
@@ -16,22 +17,24 @@ from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Empty
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
+from tf2_msgs.msg import TFMessage
 
 from quad_nav.errors import InputError, excerpt, printable
 from quad_nav.files.values import is_whole
 from quad_nav.geometry import Scan
 from quad_nav.mission.respawn import RESPAWNED
-from quad_nav.ros.common.conversions import twist_from_message
+from quad_nav.ros.common.conversions import pose_from_transform, twist_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings, publish_health
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.rospy_repairs import sender_of
 from quad_nav.topics.health import Health
-from quad_nav.topics.validation import CommandLease, twist_problem
+from quad_nav.topics.validation import CommandLease, pose_problem, twist_problem
 from quad_nav.topics.vehicle_states import IN_FLIGHT, State
 from quad_vehicles import crazyflie_adapter
 from quad_vehicles.autopilots import AUTOPILOTS
 from quad_vehicles.crazyflie_link import CrazyflieLink
 from quad_vehicles.link import VehicleLink
+from quad_vehicles.localizers import name_of
 from quad_vehicles.mavlink_link import MavlinkLink
 from quad_vehicles.orders import Permissions, Response
 from quad_vehicles.ros.maneuvers import (
@@ -47,7 +50,7 @@ from quad_vehicles.ros.topics import MissionPause, VehicleTopics, vehicle_health
 from quad_vehicles.safety import COMMAND_HOVER_S
 from quad_vehicles.states import VehicleMachine
 from quad_vehicles.telemetry import Estimate
-from quad_vehicles.vehicle_file import Vehicle, load_vehicles
+from quad_vehicles.vehicle_file import FIXED, Vehicle, load_vehicles
 
 TICK_S = 0.025
 READ_S = 0.1
@@ -56,6 +59,7 @@ MANEUVER_WAIT_S = 30.0
 SHUTDOWN_WAIT_S = 12.0
 """For a vehicle that needs us until it is down; roslaunch kills nodes after 15 s."""
 LAND_ALL_TOPIC = "/vehicles/land_all"
+_TF = {"/tf": 0.0, "/tf_static": math.inf}  # how long a transform holds, s
 _BUSY = (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING)
 
 
@@ -85,6 +89,10 @@ class VehicleNode:
             ),
             rospy.Subscriber(LAND_ALL_TOPIC, Empty, self._land_all, queue_size=1),
         ]
+        for topic, lasts_s in _TF.items() if vehicle.localization != FIXED else ():
+            self._subscribers.append(
+                rospy.Subscriber(topic, TFMessage, self._on_transforms, lasts_s, queue_size=100)
+            )
         self._services = [
             rospy.Service(f"/vehicle{i}/{name}", Trigger, handler)
             for name, handler in (
@@ -201,6 +209,19 @@ class VehicleNode:
             with self._bridge.lock:
                 self._bridge.machine.inputs.take_idle(time.monotonic())
 
+    def _on_transforms(self, message: TFMessage, lasts_s: float) -> None:
+        """Take the pose of the odometry frame from whoever localizes the vehicle."""
+        for one in message.transforms:
+            if one.child_frame_id.lstrip("/") == f"odom{self._vehicle.number}":
+                pose = pose_from_transform(one)
+                problem = pose_problem(pose)
+                if problem:
+                    self._warn(f"transform of {one.child_frame_id} dropped: {problem}")
+                    continue
+                with self._bridge.lock:
+                    inputs = self._bridge.machine.inputs
+                    inputs.take_frame(pose.to_2d(), time.monotonic() + lasts_s)
+
     def _land_all(self, _: Empty) -> None:
         with self._bridge.lock:
             self._bridge.machine.land(time.monotonic(), "all vehicles land", is_stop_all=True)
@@ -287,7 +308,9 @@ def make_bridge(
     """
     is_crazyflie = vehicle.kind == "crazyflie"
     traits = crazyflie_adapter.TRAITS if is_crazyflie else AUTOPILOTS[vehicle.autopilot].traits
-    machine = VehicleMachine(vehicle.altitude_m, vehicle.limits, traits, permissions)
+    machine = VehicleMachine(
+        vehicle.altitude_m, vehicle.limits, traits, permissions, name_of(vehicle)
+    )
     if is_crazyflie:
         return CrazyflieLink(vehicle, machine, clock)
     return MavlinkLink(vehicle, machine, clock)

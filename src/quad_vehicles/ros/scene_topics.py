@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 import threading
-from typing import Dict, List, Optional, Sequence, Tuple
+from types import MappingProxyType
+from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 import rospy
@@ -17,7 +18,7 @@ from quad.msg import FlightInfo as FlightInfoMessage
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
-from quad_nav.geometry import Pose3D
+from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.ros.common.conversions import (
     ScanMessage,
     pose_from_transform,
@@ -36,6 +37,7 @@ from quad_nav.topics.flight_info import FLIGHT_TOPIC, FlightInfo
 from quad_nav.topics.markers import number_markers, quadcopter_markers, scene_markers
 from quad_nav.topics.validation import pose_problem
 from quad_nav.versions import versions
+from quad_vehicles.ros.topics import frame_at
 
 _FRAME = re.compile(r"(odom|base_link)(\d{1,4})")
 _ABSENT_M = -1000.0  # height of a body whose pose is not known yet
@@ -66,9 +68,15 @@ class SceneTopics:
 class PoseListener:
     """Last pose of each robot in `map`, from tf."""
 
-    def __init__(self, robots: int) -> None:
-        """Subscribe to `/tf`."""
-        self._robots = robots
+    def __init__(self, robots: int, starts: Mapping[int, Pose2D] = MappingProxyType({})) -> None:
+        """Subscribe to `/tf`.
+
+        Args:
+            robots: Number of robots.
+            starts: Where robots stand at first that are where their odometry says, whatever a
+                localization says: it reads the scans that are made from these poses.
+        """
+        self.robots, self._starts = robots, starts
         self._lock = threading.Lock()
         self._odom: Dict[int, Pose3D] = {}
         self._base: Dict[int, Tuple[Pose3D, rospy.Time]] = {}
@@ -77,15 +85,19 @@ class PoseListener:
     def _take(self, message: TFMessage) -> None:
         for one in message.transforms:
             found = _FRAME.fullmatch(one.child_frame_id)
-            if found is None or int(found[2]) >= self._robots:
+            if found is None or int(found[2]) >= self.robots:
                 continue
             pose, robot = pose_from_transform(one), int(found[2])
             if pose_problem(pose):
                 continue
             with self._lock:
                 if found[1] == "odom" and one.header.frame_id == "map":
-                    self._odom[robot] = pose
+                    if robot not in self._starts:
+                        self._odom[robot] = pose
                 elif found[1] == "base_link":
+                    if robot in self._starts and robot not in self._base:
+                        start = self._starts[robot]
+                        self._odom[robot] = frame_at(start, pose.to_2d(), pose.z_m)
                     self._base[robot] = pose, one.header.stamp
 
     def pose(self, robot: int) -> Optional[Tuple[Pose3D, rospy.Time]]:
@@ -101,17 +113,17 @@ class SceneLidars:
     """Publish the scans that LIDARs on the vehicles would see in a scene."""
 
     def __init__(
-        self, scene: Scene, robots: int, scanned: Sequence[int], params: LidarParams
+        self, scene: Scene, poses: PoseListener, scanned: Sequence[int], params: LidarParams
     ) -> None:
         """Advertise the scans.
 
         Args:
             scene: The scene.
-            robots: Number of robots; all are seen.
+            poses: Poses of all robots; all are seen.
             scanned: Robots whose scans are published.
             params: Beam pattern and noise.
         """
-        self._poses = PoseListener(robots)
+        self._poses, robots = poses, poses.robots
         self._lidars = kernel_lidars(params, scene, robots, seed=0)
         self._robots = robots
         self._publishers = {

@@ -54,13 +54,19 @@ class SimulatedVehicles:
     tick_s = TICK_S
 
     def __init__(
-        self, scene: Scene, vehicles: Sequence[Vehicle], are_real_in_scene: bool, now_s: float
+        self,
+        scene: Scene,
+        vehicles: Sequence[Vehicle],
+        poses: PoseListener,
+        are_real_in_scene: bool,
+        now_s: float,
     ) -> None:
         """Advertise the topics.
 
         Args:
             scene: The room.
             vehicles: All vehicles of the file.
+            poses: Poses of the real ones.
             are_real_in_scene: Whether contacts of real vehicles with the scene count: their
                 LIDARs see it too.
             now_s: Monotonic time.
@@ -73,7 +79,7 @@ class SimulatedVehicles:
         self._simulated = [one.number for one in vehicles if one.kind == "simulated"]
         self._are_real_in_scene = are_real_in_scene
         self._simulation = Simulation(replace(scene, starts=starts), len(vehicles))
-        self._poses = PoseListener(len(vehicles))
+        self._poses = poses
         self._last: Dict[int, Pose3D] = {}  # poses of the real ones
         self._commands = Commands(self._simulation, self._simulated)
         self._contacts = rospy.Publisher(CONTACTS_TOPIC, ContactMessage, queue_size=100)

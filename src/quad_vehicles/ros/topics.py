@@ -27,9 +27,10 @@ from quad_nav.ros.common.conversions import (
 )
 from quad_nav.topics.health import Health, Level
 from quad_nav.topics.vehicle_states import IN_FLIGHT, ON_GROUND, State
+from quad_vehicles.safety import LOST_HOVER_S
 from quad_vehicles.states import VehicleMachine
 from quad_vehicles.telemetry import Estimate, Landed
-from quad_vehicles.vehicle_file import Vehicle
+from quad_vehicles.vehicle_file import AMCL, FIXED, SLAM, Vehicle
 
 _SERVICE_WAIT_S = 2.0
 _MISSION_PERIOD_S = 1.0
@@ -56,6 +57,7 @@ class VehicleTopics:
         self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
         self._odometry = rospy.Publisher(f"/odom{i}", Odometry, queue_size=10, tcp_nodelay=True)
         self._state = rospy.Publisher(f"/vehicle{i}/state", VehicleState, queue_size=10, latch=True)
+        self._is_localized = vehicle.localization != FIXED
         self._map_from_odom: Optional[Pose3D] = vehicle.map_from_odom
         self._on_ground: Optional[Pose3D] = None  # the same before the first take-off
         self._scan: Optional[rospy.Publisher] = None
@@ -87,7 +89,7 @@ class VehicleTopics:
     def publish_estimate(self, estimate: Estimate, machine: VehicleMachine) -> None:
         """Publish odometry and transforms; the estimate's stamp is monotonic time."""
         stamp = time_message(estimate.stamp_s + _clock_offset_s())
-        pose = estimate.odom_from_base
+        pose = self._levelled(estimate.odom_from_base, machine)
         self._odometry.publish(
             odometry_message(
                 pose,
@@ -107,24 +109,37 @@ class VehicleTopics:
         self._tf.publish(TFMessage(transforms))
 
     def map_from_odom(self, odom_from_base: Pose3D, machine: VehicleMachine) -> Optional[Pose3D]:
-        """Return the pose of the odometry frame; None if another node publishes it.
+        """Return the pose of the odometry frame; None if a localization publishes it.
 
         With a known pose at the start it is fixed at the first take-off. Before, it follows the
         estimate on the ground, which drifts while the vehicle stands still. In the air nobody knows
         it, if the vehicle was not seen on the ground.
         """
         start = self._vehicle.map_from_start
-        if self._map_from_odom is not None or start is None:
+        if self._is_localized or self._map_from_odom is not None or start is None:
             return self._map_from_odom
         if self.starts.first is not None:
-            self._map_from_odom = _frame_at(start, *self.starts.first)
+            self._map_from_odom = frame_at(start, *self.starts.first)
             return self._map_from_odom
         if machine.state in ON_GROUND:
-            self._on_ground = _frame_at(start, odom_from_base.to_2d(), odom_from_base.z_m)
+            self._on_ground = frame_at(start, odom_from_base.to_2d(), odom_from_base.z_m)
         return self._on_ground
+
+    def _levelled(self, pose: Pose3D, machine: VehicleMachine) -> Pose3D:
+        """Return a pose of odometry for amcl and slam, which work in the plane.
+
+        It counts heights from the ground, because they leave ``odom{i}`` at the height of ``map``:
+        the origin of an autopilot's heights is where it was switched on, and its barometer drifts.
+        """
+        if self._vehicle.localization not in (AMCL, SLAM):
+            return pose
+        ground_m = pose.z_m if machine.state in ON_GROUND else machine.ground_m
+        return replace(pose, z_m=pose.z_m - ground_m)
 
     def is_lost(self, machine: VehicleMachine) -> bool:
         """Return whether the vehicle is in the air and nobody knows where in ``map``."""
+        if self._is_localized:
+            return machine.inputs.lost_s(time.monotonic()) > LOST_HOVER_S
         status = machine.inputs.status
         is_up = status is not None and status.is_armed
         is_up = is_up and machine.inputs.landed is not Landed.ON_GROUND
@@ -150,7 +165,7 @@ class VehicleTopics:
 _DEFAULT_MOUNT = Pose3D(0.0, 0.0, 0.06)
 
 
-def _frame_at(map_from_base: Pose2D, odom_from_base: Pose2D, ground_m: float) -> Pose3D:
+def frame_at(map_from_base: Pose2D, odom_from_base: Pose2D, ground_m: float) -> Pose3D:
     """Return the pose of the odometry frame in which both poses are the same place."""
     frame = map_from_base.compose(odom_from_base.inverse()).to_3d()
     return Pose3D(frame.x_m, frame.y_m, -ground_m, frame.quaternion)

@@ -22,6 +22,7 @@ from quad_nav.ros.composed.group import ComposedGroup, GroupMaker
 from quad_nav.ros.composed.own_nodes import OwnNodes
 from quad_nav.ros.navigator.intention_topics import IntentionListener
 from quad_nav.scenario.simulator_setup import SimulatorSetup
+from quad_nav.sim.localization import believed_states
 
 PATIENCE_S = 0.5
 """Wall time for which the simulation waits for a process, which may be stopped."""
@@ -64,7 +65,7 @@ class ComposedFleet:
         self.loop = FlightLoop(
             _loop_setup(setup, start_step),
             shares,
-            GroupMaker(tuple(nodes), tuple(shares)),
+            GroupMaker(tuple(nodes), tuple(shares), setup.localization),
             "forkserver",
             self._on_loss,
             PATIENCE_S,
@@ -96,7 +97,8 @@ class ComposedFleet:
 
     def _hear_others(self) -> None:
         """Tell the navigators what robots with other navigators intend."""
-        now_s, states = self.loop.now_s, self.loop.states
+        now_s = self.loop.now_s
+        states = believed_states(self.loop.states, self.loop.group.localization)
         for robot in self._others:
             state = states[robot]
             peer = peer_at(f"quad{robot}", state.map_from_base.to_2d(), state.twist, now_s)
@@ -124,8 +126,8 @@ class ComposedFleet:
 
 def _processes(setup: SimulatorSetup) -> int:
     """Return the number of processes that share the navigators."""
-    if setup.params.lidar_caster != "kernel":
-        return 1  # the engine's rays need the bodies in the simulator's process
+    if setup.params.lidar_caster != "kernel" or setup.localization == "amcl":
+        return 1  # the engine's rays need the bodies, and an amcl the peers, in the same process
     load = len(setup.configurations) * setup.rate / _ROBOTS_PER_PROCESS
     return setup.hosts or processes_for(math.ceil(load), "forkserver")
 

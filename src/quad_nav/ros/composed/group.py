@@ -20,12 +20,15 @@ from quad_nav.ros.common.conversions import ScanMessage, scan_message, time_mess
 from quad_nav.ros.common.diagnostics import publish_health
 from quad_nav.ros.common.readiness import TopicWatch, start_node
 from quad_nav.ros.common.rospy_repairs import set_time
+from quad_nav.ros.composed.localization import localization_of
 from quad_nav.ros.composed.own_nodes import OwnNodes, hear_others_only
 from quad_nav.ros.composed.robot import ComposedRobot
 from quad_nav.ros.composed.transforms import ComposedTransforms
 from quad_nav.ros.navigator.costmap_publisher import NewSubscriber, Publish
 from quad_nav.ros.navigator.health_meters import LoopHealth
+from quad_nav.scenario.rules import SIMULATOR
 from quad_nav.sim.casters import Lidars
+from quad_nav.sim.localization import Localization
 from quad_nav.sim.robot_state import RobotStates
 
 
@@ -62,10 +65,24 @@ class ComposedGroup(NavigatorGroup):
 
     robots: Dict[int, ComposedRobot]  # type: ignore[assignment]
 
-    def __init__(self, setup: LoopSetup, robots: Sequence[int], lidars: Lidars) -> None:
-        """Build and connect the navigators of ``robots``; ``lidars`` are those of all robots."""
-        self.transforms = ComposedTransforms()
+    def __init__(
+        self,
+        setup: LoopSetup,
+        robots: Sequence[int],
+        lidars: Lidars,
+        localization: str = SIMULATOR,
+    ) -> None:
+        """Build and connect the navigators of ``robots``.
+
+        Args:
+            setup: The loop's set-up.
+            robots: Their numbers.
+            lidars: LIDARs of all robots.
+            localization: Who finds the robots' places.
+        """
+        self.transforms = ComposedTransforms(localization == SIMULATOR)
         self._states: Optional[RobotStates] = None
+        self._found = localization_of(localization, self.transforms, setup.configurations, robots)
         super().__init__(setup, robots, lidars)
         self._scans = {number: ScanTopic(number) for number in robots}
         interfaces = [robot.interface for robot in self.robots.values()]
@@ -73,7 +90,9 @@ class ComposedGroup(NavigatorGroup):
         self._topic_watch = TopicWatch(
             [subscriber for robot in self.robots.values() for subscriber in robot.subscribers]
         )
-        self._needs_transforms = any(robot.needs_transforms for robot in self.robots.values())
+        self._needs_transforms = self._found is not None or any(
+            robot.needs_transforms for robot in self.robots.values()
+        )
         publish_health(self._loop_health.read)
 
     def new_robot(self, number: int) -> ComposedRobot:
@@ -81,12 +100,18 @@ class ComposedGroup(NavigatorGroup):
         configuration = self.setup.configurations[number]
         return ComposedRobot(configuration, number, self.transforms)
 
+    def _new_localization(self) -> Optional[Localization]:
+        if self._found is not None:
+            self._found.reset()
+        return self._found
+
     def set_maps(self) -> None:
         """Leave static layers to their topics."""
 
     def scan(self, now_s: float, states: RobotStates) -> Dict[int, LocatedScan]:
         """Take scans, hand them to the navigators and publish them."""
         set_time(time_message(now_s))
+        self.transforms.update(now_s, states)
         scans = super().scan(now_s, states)
         for number, (scan, _) in scans.items():
             self._scans[number].publish(scan)
@@ -97,7 +122,6 @@ class ComposedGroup(NavigatorGroup):
     ) -> List[NavigatorResult]:
         """Tick the navigators that are due, and publish their results."""
         set_time(time_message(now_s))
-        self._states = states
         self.transforms.update(now_s, states)
         if self._needs_transforms:
             self.transforms.store()
@@ -105,6 +129,12 @@ class ComposedGroup(NavigatorGroup):
         self._loop_health.update(now_s, 0.0)
         self._topic_watch.check()
         return results
+
+    def _believed(self, states: RobotStates) -> RobotStates:
+        self._states = super()._believed(states)
+        if self._found is not None:
+            self._found.note(self._states)
+        return self._states
 
     @property
     def due_s(self) -> float:
@@ -131,10 +161,12 @@ class GroupMaker:
     Attributes:
         nodes: Full names of the processes' nodes, the simulator first.
         shares: Numbers of the robots of each.
+        localization: Who finds the robots' places.
     """
 
     nodes: Tuple[str, ...]
     shares: Tuple[Tuple[int, ...], ...]
+    localization: str = SIMULATOR
 
     def __call__(self, setup: LoopSetup, robots: Sequence[int], lidars: Lidars) -> NavigatorGroup:
         """Make the group of this process, which becomes a node unless it is the simulator's."""
@@ -142,7 +174,7 @@ class GroupMaker:
         if not robots:
             return NavigatorGroup(setup, robots, lidars)  # a simulation alone
         if process == 0:
-            return ComposedGroup(setup, robots, lidars)
+            return ComposedGroup(setup, robots, lidars, self.localization)
         hear_others_only(OwnNodes(self.nodes))
         # The simulator's name, log and remappings of its name do not concern this node.
         start_node(
@@ -150,7 +182,7 @@ class GroupMaker:
             [one for one in sys.argv if not one.startswith(("__name:=", "__log:="))],
             hears_clock=False,
         )
-        group = _WorkerGroup(setup, robots, lidars)
+        group = _WorkerGroup(setup, robots, lidars, self.localization)
         rospy.loginfo("%s: ready, robots: %d", rospy.get_name().lstrip("/"), len(robots))
         return group
 

@@ -42,6 +42,7 @@ from quad_nav.ros.navigator.nodes import log_invalid, prepare
 from quad_nav.ros.navigator.reconfigure import ParameterServer, config_type
 from quad_nav.ros.simulator.commands import Commands
 from quad_nav.ros.simulator.topics import SimulatorTopics
+from quad_nav.scenario.rules import SIMULATOR
 from quad_nav.scenario.simulator_setup import (
     DEFAULTS,
     SimulatorSetup,
@@ -84,7 +85,7 @@ class SimulatorNode:
         self._simulation = self._loop.simulation
         others = [i for i in range(setup.robots) if i not in self._fleet.hosted]
         self._topics = SimulatorTopics(
-            self._simulation, setup.map_resolution_m, setup.localizes, others
+            self._simulation, setup.map_resolution_m, setup.localization == SIMULATOR, others
         )
         self._commands = Commands(self._simulation)
         self._meter = RateMeter()
@@ -242,7 +243,7 @@ class SimulatorNode:
             self._commands.give(*command)
 
     def _wait_paused(self) -> None:
-        """Republish the state for new subscribers, except tf, which is latched."""
+        """Republish the state for new subscribers, except tf, which they get."""
         if time.monotonic() >= self._next_republish_s:
             self._next_republish_s = time.monotonic() + _PAUSED_PERIOD_S
             self._publish_clock()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Tuple
+from typing import Optional, Tuple
 
 import numpy as np
 import rospy
@@ -22,6 +22,7 @@ from quad_nav.ros.common.packed_messages import (
     pose_row,
     states_message,
 )
+from quad_nav.ros.navigator.costmap_publisher import NewSubscriber, Publish
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.odometry import pose_in
 from quad_nav.sim.simulation import Simulation
@@ -51,7 +52,8 @@ class PoseTopics:
             [pair for pairs in frames for pair in pairs[self._first :]]
         )
         self._odometry_writers = [OdometryWriter(*pairs[1]) for pairs in frames]
-        self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10, latch=True)
+        self._last: Optional[rospy.AnyMsg] = None
+        self._tf = rospy.Publisher("/tf", TFMessage, NewSubscriber(self._send_last), queue_size=10)
         self._odometry = [rospy.Publisher(f"/odom{i}", Odometry, queue_size=10) for i in robots]
         self._states = rospy.Publisher(STATES_TOPIC, StatesMessage, queue_size=10)
         self._in_bulk = self._robots_in_bulk()
@@ -99,7 +101,16 @@ class PoseTopics:
                 transforms[i, 0] = pose_row(self._simulation.map_from_frame(f"odom{i}", i).to_3d())
                 transforms[i, 1] = self._in_odom(i, pose)
         rows = transforms[:, self._first :].reshape(-1, 7)
-        self._tf.publish(self._transform_writer.message(stamp, rows))
+        self._last = self._transform_writer.message(stamp, rows)
+        self._tf.publish(self._last)
+
+    def _send_last(self, send: Publish) -> None:
+        """Send it to a node that subscribes while the simulation is paused.
+
+        A latch would hold what another publisher of this process has sent.
+        """
+        if self._last is not None:
+            send(self._last)
 
     def _in_odom(self, robot: int, map_from_base: Floats) -> Floats:
         """Return the pose of a quadcopter in its odometry frame, float64[7]."""

@@ -50,9 +50,9 @@ _LAGGING_REPORTS = 3
 class SimulatorTopics:
     """Publishers of the simulator.
 
-    States, odometry and scans are computed only for subscribers. `/clock` and `/tf` are latched: a
-    node that starts while the simulation is paused receives them, and no transform is sent twice
-    with the same stamp, about which tf2 would warn.
+    States, odometry and scans are computed only for subscribers. A node that starts while the
+    simulation is paused receives `/clock` and `/tf`, and no transform is sent twice with the same
+    stamp, about which tf2 would warn.
 
     Attributes:
         lidar_enabled: Whether each LIDAR is on; services change it.
