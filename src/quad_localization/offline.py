@@ -52,9 +52,10 @@ class SlamLocalization(Localization):
             return None
         return place.map_from_odom.compose(place.odom_from_base), place.covariance
 
-    def set_pose(self, robot: int, pose: Pose2D, covariance: NDArray[np.float64]) -> None:
+    def set_pose(self, robot: int, pose: Pose2D, covariance: NDArray[np.float64]) -> bool:
         """Tell a robot roughly where it is; the covariance is that of the start."""
         self.slam.set_pose(robot, pose)
+        return True
 
 
 class AmclLocalization(Localization):
@@ -117,9 +118,10 @@ class AmclLocalization(Localization):
         particles = self.amcls[robot].particles
         return None if particles is None else particles.poses
 
-    def set_pose(self, robot: int, pose: Pose2D, covariance: NDArray[np.float64]) -> None:
+    def set_pose(self, robot: int, pose: Pose2D, covariance: NDArray[np.float64]) -> bool:
         """Tell a robot where it is."""
         self.amcls[robot].set_pose(PoseEstimate(pose, covariance))
+        return True
 
     def set_uniform(self, robot: int) -> bool:
         """Let a robot search the whole map."""

@@ -42,9 +42,9 @@ class Localization(Protocol):
         """Return particles float64[n, 3], poses in ``map``; None if the method has none."""
         return None
 
-    def set_pose(self, robot: int, pose: Pose2D, covariance: NDArray[np.float64]) -> None:
-        """Tell a robot where it is in ``map``, as a person sees it; its next scan counts."""
-        raise NotImplementedError
+    def set_pose(self, robot: int, pose: Pose2D, covariance: NDArray[np.float64]) -> bool:
+        """Tell a robot where it is in ``map``; return False if the method cannot be told."""
+        return False
 
     def set_uniform(self, robot: int) -> bool:
         """Let a robot search the whole map; return False if the method cannot."""

@@ -184,7 +184,8 @@ class FlightActions(GoalEditing):
         faults = list(goal_faults([pose.x_m, pose.y_m, pose.yaw_rad]))
         if faults:
             raise InputError([f"pose{faults[0]}"])
-        self._localization(robot).set_pose(robot, pose, GIVEN_COVARIANCE)
+        if not self._localization(robot).set_pose(robot, pose, GIVEN_COVARIANCE):
+            return Answer(False, f"{self._name(robot)}: its localization takes no pose")
         return self._did(robot, given_text(pose))
 
     def set_uniform(self, robot: int) -> Answer:
