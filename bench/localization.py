@@ -23,7 +23,6 @@ from quad_nav.config.files import leaves
 from quad_nav.files.document import read_yaml
 from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Twist2D
-from quad_nav.grid import GridSpec
 from quad_nav.offline.flight import Flight
 from quad_nav.offline.run import fly
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
@@ -72,9 +71,7 @@ def shares_drawn(localization: Any, scene: Scene) -> Tuple[float, float]:
     if not hasattr(localization, "slam"):
         return np.nan, np.nan
     grid = localization.slam.map.grid()
-    rows, columns = grid.occupancy.shape
-    spec = GridSpec(columns, rows, grid.resolution_m, grid.origin.x_m, grid.origin.y_m)
-    solid, mapped = touched_cells(scene, spec), grid.occupancy == 100
+    solid, mapped = touched_cells(scene, grid.spec), grid.occupancy == 100
     seen = solid & grown(~solid & (grid.occupancy >= 0))
     return grown(solid)[mapped].mean(), grown(mapped)[seen].mean()
 
