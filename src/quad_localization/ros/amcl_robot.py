@@ -24,16 +24,16 @@ from nav_msgs.srv import GetMap, SetMap, SetMapRequest, SetMapResponse
 from std_msgs.msg import Header
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
-from quad_localization.localizer import Amcl, Observation, PoseEstimate, is_covariance
+from quad_localization.localizer import Amcl, Observation, PoseEstimate
 from quad_localization.occupancy_map import OccupancyMap
 from quad_localization.parameters import AmclParams, read_params
+from quad_localization.ros.given_pose import given_pose
 from quad_localization.scan_beams import tilted_yaw
 from quad_nav.errors import excerpt
 from quad_nav.geometry import Pose2D, Pose3D, covariance_36
 from quad_nav.parameter import parameters_of
 from quad_nav.ros.common.conversions import (
     pose_array_message,
-    pose_from_message,
     pose_message,
     transform_message,
 )
@@ -43,7 +43,7 @@ from quad_nav.ros.navigator.reconfigure import ParameterServer, config_type
 from quad_nav.ros.navigator.robot_identity import number_in
 from quad_nav.topics.health import Health, Level
 from quad_nav.topics.publishing import Names, own_node
-from quad_nav.topics.validation import grid_problem, pose_problem
+from quad_nav.topics.validation import grid_problem
 
 _QUEUE = 100
 _POLL_S = 0.01  # wall time: how late a transform is noticed
@@ -203,18 +203,10 @@ class AmclRobot:
 
     def _take_pose(self, message: PoseWithCovarianceStamped) -> bool:
         """Begin anew at a pose, moved by the odometry since its stamp; return false if invalid."""
-        frame, params = message.header.frame_id.lstrip("/"), self.params
-        pose = pose_from_message(message.pose.pose)
-        matrix = np.array(message.pose.covariance, np.float64).reshape(6, 6)
-        covariance = np.zeros((3, 3))
-        covariance[:2, :2], covariance[2, 2] = matrix[:2, :2], matrix[5, 5]
-        problem = pose_problem(pose)
-        if frame not in ("", params.global_frame_id):
-            problem = f"frame '{excerpt(frame)}', expected '{params.global_frame_id}'"
-        elif not is_covariance(covariance):
-            problem = "the covariance is not positive semidefinite"
-        if problem:
-            self._warn(f"initial pose dropped: {problem}")
+        try:
+            pose, covariance = given_pose(message, self.params.global_frame_id)
+        except ValueError as error:
+            self._warn(f"initial pose dropped: {error}")
             return False
         pose = pose.compose(self._motion_since(message.header.stamp))
         planar = Pose2D(pose.x_m, pose.y_m, tilted_yaw(pose.quaternion))
@@ -286,6 +278,7 @@ class AmclRobot:
             is_lost, particles = self._amcl.is_lost, self._amcl.particles
             if particles is None:
                 self._waiting = stamp, seen
+                self._warn("no map yet: no transform until there is one")
             if particles is None or update is None:
                 return
             poses = particles.poses.copy() if update.shows_cloud else None

@@ -18,6 +18,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 
 from quad_localization.ros.amcl_robot import SILENT_S
+from quad_localization.ros.given_pose import given_pose
 from quad_localization.ros.reset_watch import ResetWatch
 from quad_localization.ros.transform_topic import TransformTopic
 from quad_localization.slam import Slam, SlamPose
@@ -28,7 +29,6 @@ from quad_nav.files.values import is_number, is_whole
 from quad_nav.geometry import Pose2D, covariance_36
 from quad_nav.ros.common.conversions import (
     ScanMessage,
-    pose_from_message,
     pose_message,
     scan_from_message,
     transform_message,
@@ -38,7 +38,7 @@ from quad_nav.ros.common.nav_messages import map_message
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.topics.health import Health, Level
-from quad_nav.topics.validation import pose_problem, scan_problem, stamp_problem
+from quad_nav.topics.validation import scan_problem, stamp_problem
 
 EXIT_BAD_INPUT = 2
 MAP_PERIOD_S = 1.0
@@ -80,14 +80,10 @@ class SlamRobot:
             self.scans.append(message)
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
-        pose, frame = pose_from_message(message.pose.pose), message.header.frame_id.lstrip("/")
-        problem = pose_problem(pose)
-        if frame not in ("", "map"):
-            problem = f"frame '{excerpt(frame)}', expected 'map'"
-        if problem:
-            self.warnings.warn(f"{self.name}: initial pose dropped: {problem}", "pose")
-        else:
-            self.pose = pose.to_2d()
+        try:
+            self.pose = given_pose(message, "map")[0].to_2d()
+        except ValueError as error:
+            self.warnings.warn(f"{self.name}: initial pose dropped: {error}", "pose")
 
 
 class SlamNode:
