@@ -43,6 +43,15 @@ class GrowingMap:
         """True before the first scan."""
         return not self.views[0].log_odds.size
 
+    def distance_m(self, place: NDArray[np.float64]) -> float:
+        """Return how far a place float64[2] is from the map, 0 from an empty one."""
+        if self.is_empty:
+            return 0.0
+        view = self.views[0]
+        low = np.array([view.origin_x_m, view.origin_y_m])
+        high = low + view.resolution_m * np.array(view.log_odds.shape[::-1])
+        return float(np.linalg.norm(place - np.clip(place, low, high)))
+
     def insert(self, sensor: NDArray[np.float64], points: NDArray[np.float64]) -> None:
         """Insert a scan: ends of beams float64[n, 2] from a sensor float64[2], all in ``map``."""
         corners = np.vstack([points, sensor[None]])

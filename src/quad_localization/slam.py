@@ -37,6 +37,8 @@ that graze a wall, tell where the beams were rather than where the wall is."""
 _SEARCH_M, _SEARCH_RAD = 2.0, 0.5
 _ENOUGH_KNOWN = 0.3
 """Share of a scan that must be on the map to be fitted to it."""
+_FAR_M = 100.0
+"""Farther than a LIDAR sees; a map that holds such a place may not fit into memory."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,7 @@ class SlamParams:
         insert_rad: Turn after which a scan is inserted.
         lost_below: Mean occupancy at the ends of beams below which the robot is lost. Where a scan
             fits, it is 0.6 or more; in free space it is near 0.
+        lost_above_m: Standard deviation above which a robot whose scan is off the map is lost.
     """
 
     resolution_m: float = CELL_M
@@ -68,6 +71,7 @@ class SlamParams:
     insert_m: float = 0.2
     insert_rad: float = 0.2
     lost_below: float = 0.4
+    lost_above_m: float = 0.5
 
 
 @dataclass
@@ -131,7 +135,7 @@ class Slam:
             found = self._fitted(start, prior, place, few)
             place.map_from_odom = _pose(found).compose(odom_from_base.inverse())
         else:
-            found, place.is_lost = prior, False
+            found, place.fit, place.is_lost = prior, 0.0, self._is_astray(place, prior)
         sensor = odom_from_base.inverse_transform(odom_from_lidar.x_m, odom_from_lidar.y_m)
         self._insert(place, _pose(found), sensor, surfaces)
         return place
@@ -192,6 +196,11 @@ class Slam:
             return prior
         place.covariance = np.linalg.inv(hessian + information)
         return found
+
+    def _is_astray(self, place: SlamPose, prior: Floats) -> bool:
+        """Tell whether a robot whose scan is off the map is not just where nobody was before."""
+        is_unsure = np.trace(place.covariance[:2, :2]) > self._params.lost_above_m**2
+        return bool(is_unsure or self.map.distance_m(prior[:2]) > _FAR_M)
 
     def _searched(self, prior: Floats, place: SlamPose, points: Floats) -> Floats:
         """Return the best of the poses around one, within two standard deviations of it.

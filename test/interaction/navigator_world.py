@@ -309,7 +309,7 @@ class NavigatorWorld:
         stamp = self._clock()
         for robot, body in enumerate(self.bodies):
             if self._gives("tf", robot):
-                self._tf.publish(transforms(robot, body.pose, stamp))
+                self._tf.publish(TFMessage(self._transforms(robot, stamp)))
             if self._gives("odometry", robot):
                 self._odometry[robot].publish(odometry(robot, body, stamp))
             if self._steps % 2 == 0 and self._gives("scan", robot):
@@ -321,28 +321,27 @@ class NavigatorWorld:
             places.append(self.peer)
         self._states.publish(states(places, stamp))
 
+    def _transforms(self, robot, stamp):
+        frames = ("map", f"odom{robot}", f"base_link{robot}", f"Lidar{robot}")
+        poses = (Pose3D(0.0, 0.0, 0.0), self.bodies[robot].pose.to_3d(), Pose3D(0.0, 0.0, 0.06))
+        return [
+            conversions.transform_message(pose, parent, child, stamp)
+            for pose, parent, child in zip(poses, frames, frames[1:])
+        ]
+
     def _scan(self, robot, topic, before_s):
         """Publish a scan that was taken a time before."""
+        message = conversions.scan_message(self._scan_of(robot, before_s), f"Lidar{robot}")
+        message.header.stamp = self._clock(before_s)
+        self._scans[topic].publish(message)
+
+    def _scan_of(self, robot, before_s):
         circles = []
         if robot == 0:
             circles = [walker.place(before_s) for walker in self.walkers]
             circles += [] if self.peer is None else [(self.peer.x_m, self.peer.y_m)]
         ranges = ranges_m(self.bodies[robot].pose_at(before_s), FAR_M * robot, circles)
-        scan = Scan(0.0, -math.pi, math.tau / BEAMS, 0.02, 60.0, ranges)
-        message = conversions.scan_message(scan, f"Lidar{robot}")
-        message.header.stamp = self._clock(before_s)
-        self._scans[topic].publish(message)
-
-
-def transforms(robot, pose, stamp):
-    frames = ("map", f"odom{robot}", f"base_link{robot}", f"Lidar{robot}")
-    poses = (Pose3D(0.0, 0.0, 0.0), pose.to_3d(), Pose3D(0.0, 0.0, 0.06))
-    return TFMessage(
-        [
-            conversions.transform_message(pose, parent, child, stamp)
-            for pose, parent, child in zip(poses, frames, frames[1:])
-        ]
-    )
+        return Scan(0.0, -math.pi, math.tau / BEAMS, 0.02, 60.0, ranges)
 
 
 def odometry(robot, body, stamp):

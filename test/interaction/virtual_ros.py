@@ -20,7 +20,7 @@ from rospy.msg import args_kwds_to_message
 
 from quad_nav.ros.common import readiness
 
-PACKAGES = ("quad_nav", "quad_vehicles", "actionlib", "dynamic_reconfigure")
+PACKAGES = ("quad_nav", "quad_localization", "quad_vehicles", "actionlib", "dynamic_reconfigure")
 
 
 class Node:
