@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Dict, Sequence
+from typing import Any, Dict, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ def error_figures(errors: Sequence[NDArray[Any]]) -> Dict[str, Any]:
     }
 
 
-def error_note(figures: Dict[str, Any]) -> str:
+def error_note(figures: Mapping[str, Any]) -> str:
     """Return ``error_figures`` as a line for people."""
     far, turned = (figures[name] for name in ("position_error_m", "yaw_error_rad"))
     return (

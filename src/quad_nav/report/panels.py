@@ -152,8 +152,8 @@ def _scatter(axes: Axes, trace: Json) -> None:
     x, y, marker, line = trace["x"], _known(trace["y"]), trace.get("marker"), trace.get("line", {})
     name, reach = trace.get("name", ""), _reach(trace.get("error_y"))
     if "fill" in trace:
-        step = "post" if line.get("shape") == "hv" else None
-        axes.fill_between(_known(x), y, color=_ink(trace["fillcolor"]), step=step, lw=0)
+        ink, is_step = _ink(trace["fillcolor"]), line.get("shape") == "hv"
+        axes.fill_between(_known(x), y, color=ink, step="post" if is_step else None, lw=0)
     if "lines" in trace["mode"]:
         axes.plot(
             _known(x),
