@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Dict, List, Optional
 
 import numpy as np
@@ -17,6 +16,7 @@ from quad_nav.errors import InputError
 from quad_nav.files.document import read_yaml
 from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, Pose3D, Scan
+from quad_nav.mission.localization_errors import error_figures, error_note, pose_errors
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.scenario.scene_map import scene_map
 from quad_nav.sim.localization import Estimate, Localization, believed_states
@@ -25,6 +25,8 @@ from quad_nav.sim.scene import Scene
 
 class SlamLocalization(Localization):
     """``Slam`` for the loop. A map that grows cannot be searched as a whole."""
+
+    name = "slam"
 
     def __init__(self, _scene: Scene, robots: int) -> None:
         """Start without a map; the odometry frames begin at ``map``."""
@@ -64,6 +66,8 @@ class AmclLocalization(Localization):
     Attributes:
         amcls: By the robots' numbers.
     """
+
+    name = "amcl"
 
     def __init__(self, scene: Scene, robots: int) -> None:
         """Begin at the scene's start poses, from which robots may be displaced.
@@ -144,21 +148,19 @@ class LocalizationErrors(FlightObserver):
     def __init__(self) -> None:
         self.errors: List[NDArray[np.float64]] = []
 
+    def on_start(self, flight: Flight) -> None:
+        """Note the errors of the start."""
+        self.on_move(flight)
+
     def on_move(self, flight: Flight) -> None:
         """Note the errors of now."""
         believed = believed_states(flight.states, flight.loop.group.localization)
-        errors = believed.poses - flight.states.poses
-        turns_rad = np.abs(np.remainder(errors[:, 2] + math.pi, 2.0 * math.pi) - math.pi)
-        self.errors.append(np.column_stack([np.hypot(errors[:, 0], errors[:, 1]), turns_rad]))
+        self.errors.append(pose_errors(believed.poses, flight.states.poses))
 
     @property
     def note(self) -> str:
         """The figures for people."""
-        far, turned = (self.figures()[name] for name in ("position_error_m", "yaw_error_rad"))
-        return (
-            f"Localization: {far['median']:.3f} m and {turned['median']:.3f} rad from the truth, in"
-            f" 95 % of the time below {far['p95']:.3f} m and {turned['p95']:.3f} rad."
-        )
+        return error_note(self.figures())
 
     @property
     def facts(self) -> Dict[str, Any]:
@@ -166,12 +168,5 @@ class LocalizationErrors(FlightObserver):
         return {"localization": self.figures()}
 
     def figures(self) -> Dict[str, Any]:
-        """Return the errors' medians and 95th percentiles, rounded to 1 mm and 1 mrad."""
-        errors = np.concatenate(self.errors) if self.errors else np.zeros((1, 2))
-        (middle_m, middle_rad), (high_m, high_rad) = np.percentile(
-            errors, [50, 95], axis=0
-        ).tolist()
-        return {
-            "position_error_m": {"median": round(middle_m, 3), "p95": round(high_m, 3)},
-            "yaw_error_rad": {"median": round(middle_rad, 3), "p95": round(high_rad, 3)},
-        }
+        """Return the figures of all errors."""
+        return error_figures(self.errors or [np.zeros((1, 2))])

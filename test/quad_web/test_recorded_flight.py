@@ -10,11 +10,16 @@ import pytest
 from hand_made_recording import LAST_S, SCENE, write_flight, x_at
 
 from quad_nav.errors import InputError
+from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.recording import messages
 from quad_nav.recording.bag_file import read_messages
+from quad_nav.recording.record_file import TopicWriter, create, stamp_at
+from quad_nav.sim.flight import BodyState
 from quad_nav.sim.motion import Motion
 from quad_nav.sim.obstacles import Box
+from quad_nav.sim.robot_state import RobotStates
 from quad_nav.sim.scene import BODY_RADIUS_M, MovingObstacle
+from quad_nav.topics.estimates import TRUTH_TOPIC
 from quad_web.replay.recorded_flight import RecordedFlight
 from quad_web.replay.recording_index import RecordingIndex
 from quad_web.view.state import LAYERS
@@ -32,9 +37,9 @@ def flight(path):
     flight.close()
 
 
-def items_at(flight: RecordedFlight, time_s: float, layers=LAYERS) -> dict:
+def items_at(flight: RecordedFlight, time_s: float, layers=LAYERS, robots=(0, 1)) -> dict:
     """Return the layers of both robots at a time, by key."""
-    parts = flight.parts(time_s, {layer: (0, 1) for layer in layers})
+    parts = flight.parts(time_s, dict.fromkeys(layers, robots))
     made = {key: make() for key, (_, make) in parts.items()}
     present = {item.key: item for item in flight.present_items(time_s)}
     return {**present, **{key: item for key, item in made.items() if item is not None}}
@@ -183,3 +188,43 @@ def test_a_trail_ends_at_the_robot(flight):
     assert trail[0].tolist() == [1.0, 2.0]
     assert x_at(10.0) - 0.13 <= trail[-1, 0] <= x_at(10.0) + 1e-6
     assert np.diff(trail[:, 0]).min() >= 0.1 - 1e-6
+
+
+def write_localized(path, with_truth: bool):
+    """Write 2 s of a robot at (1 m + 1 m/s * time, 2 m), which believes itself 0.3 m north."""
+    topics = TopicWriter(create(path))
+
+    def write(topic, stamp, content):
+        topics.write(topic, stamp, content, "/node")
+
+    for time_s in (0.0, 1.0, 2.0):
+        stamp = stamp_at(time_s)
+        frame = messages.transform(Pose3D(0.0, 0.3, 0.0), "map", "odom0", stamp)
+        write("/tf", stamp, messages.message("tf2_msgs/TFMessage", [frame]))
+        pose, frames = Pose3D(1.0 + time_s, 2.0, 1.0), ("odom0", "base_link0")
+        write("/odom0", stamp, messages.odometry(pose, (1.0, 0.0, 0.0), (0.0,) * 3, frames, stamp))
+        row = np.array([[*pose.translation, *pose.quaternion, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
+        if with_truth:
+            write(TRUTH_TOPIC, stamp, messages.true_states(RobotStates(BodyState(row)), stamp))
+    estimate = Pose2D(2.0, 2.3), np.diag([0.01, 0.03, 0.0004])
+    write("/slam_pose0", stamp_at(1.0), messages.pose_estimate(*estimate, stamp_at(1.0)))
+    topics.close()
+    return RecordedFlight(path)
+
+
+@pytest.mark.parametrize("with_truth", [True, False])
+def test_the_believed_pose_and_its_covariance_are_shown(tmp_path, with_truth):
+    """Without the truth on its topic, the robot is shown where it believes itself."""
+    flight = write_localized(tmp_path / "flight.bag", with_truth)
+    try:
+        before, then = (items_at(flight, time_s, ["localization"], (0,)) for time_s in (0.5, 1.5))
+    finally:
+        flight.close()
+    assert np.isnan(before["localization/0"].arrays["pose"][3:]).all()
+    shown = then["localization/0"].arrays["pose"]
+    assert shown == pytest.approx([2.0, 2.3, 0.0, 0.01, 0.0, 0.03, 0.0004])
+    y_m = float(then["poses"].arrays["pose"][0, 1])
+    assert y_m == pytest.approx(2.0 if with_truth else 2.3)
+    row = then["status"].data["rows"][0]["localization"]
+    assert row["deviation_m"] == pytest.approx(0.2)
+    assert row.get("error_m") == (pytest.approx(0.3) if with_truth else None)

@@ -6,11 +6,13 @@ from collections import defaultdict
 from typing import Any, DefaultDict, List, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from quad_nav.geometry import Pose3D, Twist2D, yaw_from_quaternion
+from quad_nav.geometry import Pose3D, Twist2D, yaw_from_quaternion, yaws_from_quaternions
 from quad_nav.recording.bag_file import Message
 from quad_nav.recording.messages import pose_from, stamp_ns
 from quad_nav.recording.trace import RobotTrace, goal_traces
+from quad_nav.topics.estimates import planar_covariance
 from quad_nav.topics.flight_info import RobotInfo
 from quad_nav.topics.mission_events import MissionEvent
 from quad_nav.topics.robot_topics import RobotTopic
@@ -35,7 +37,7 @@ class BagRobot:
     Attributes:
         map_from_odom: Last pose of the odometry frame in ``map``.
         odom_frame: Name of the odometry frame; "" if the recording has no transform of it.
-        moves: Rows of time, position, quaternion and velocity (vx, vy, vyaw).
+        moves: Rows of time, position, quaternion and velocity (vx, vy, vyaw), as it believes.
         events: Events of the sequencer.
     """
 
@@ -46,6 +48,8 @@ class BagRobot:
         self.events: List[MissionEvent] = []
         self._commands: List[Tuple[float, float, float, float]] = []
         self._cycles: List[float] = []
+        self._truth: List[Tuple[float, ...]] = []  # rows of time, position and quaternion
+        self._estimates: List[Tuple[float, NDArray[np.float64]]] = []  # times and covariances
         # (time, value) pairs by what they are, also the topics of ``ROBOT_TOPICS``.
         self._pairs: DefaultDict[str, List[Tuple[float, Any]]] = defaultdict(list)
 
@@ -73,6 +77,19 @@ class BagRobot:
         pose = self.map_from_odom.compose(pose)
         place = (pose.x_m, pose.y_m, pose.z_m, *pose.quaternion)
         self.moves.append((time_s, *place, *_planar(odometry.twist.twist)))
+
+    def add_truth(self, time_s: float, pose: Pose3D) -> None:
+        """Add where the robot is."""
+        require(pose_problem(pose))
+        if not self._truth or time_s > self._truth[-1][0]:
+            self._truth.append((time_s, pose.x_m, pose.y_m, pose.z_m, *pose.quaternion))
+
+    def add_estimate(self, message: Message) -> None:
+        """Add how sure the robot is of its place."""
+        time_s = _seconds(message.content.header)
+        if not self._estimates or time_s > self._estimates[-1][0]:
+            covariance = planar_covariance(message.content.pose.covariance)
+            self._estimates.append((time_s, covariance))
 
     def add_command(self, message: Message) -> None:
         """Add a velocity command."""
@@ -111,7 +128,7 @@ class BagRobot:
             start_s: Start of the flight on the recording's clock.
             info: What ``/quad/flight`` says of the robot.
         """
-        moves = np.array(self.moves)
+        moves, believed = self._placed()
         commands = np.array(self._commands).reshape(-1, 4)
         pairs = {
             name: tuple((time_s - start_s, value) for time_s, value in values)
@@ -133,7 +150,29 @@ class BagRobot:
             **{name: pairs.pop(name, ()) for name in ("plans", "recoveries", "odom_frames")},
             states=pairs.get("state", ()),
             said=pairs,
+            believed=believed,
+            covariances=self._covariances(moves[:, 0]),
         )
+
+    def _placed(self) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return ``moves`` with the true poses, and the believed ones (x, y, yaw).
+
+        Without the truth, the believed poses are the best that is known.
+        """
+        moves, truth = np.array(self.moves), np.array(self._truth).reshape(-1, 8)
+        _, rows, true_rows = np.intersect1d(moves[:, 0], truth[:, 0], return_indices=True)
+        if not len(rows):
+            return moves, np.zeros((0, 3))
+        moves, truth = moves[rows], truth[true_rows]
+        believed = np.column_stack([moves[:, 1:3], yaws_from_quaternions(moves[:, 4:8])])
+        return np.column_stack([truth, moves[:, 8:]]), believed
+
+    def _covariances(self, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the covariance of the last estimate at each time; NaN before the first."""
+        if not self._estimates:
+            return np.zeros((0, 3, 3))
+        numbers = np.searchsorted([at_s for at_s, _ in self._estimates], times_s, side="right")
+        return np.array([np.full((3, 3), np.nan), *(one for _, one in self._estimates)])[numbers]
 
 
 def _planar(twist: Any) -> Tuple[float, float, float]:

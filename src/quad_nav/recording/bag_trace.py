@@ -31,6 +31,7 @@ from quad_nav.sim.contacts import Contact
 from quad_nav.sim.crowd_record import CrowdRecord
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.topics.contacts import CONTACTS_TOPIC, contact_from_message
+from quad_nav.topics.estimates import ESTIMATE_KIND, TRUTH_KIND, TRUTH_TOPIC
 from quad_nav.topics.flight_info import (
     FLIGHT_TOPIC,
     MAX_ROBOTS,
@@ -56,6 +57,7 @@ _NODE = r"/move_base([0-9]{1,4})"
 # Topic, type, and what adds its messages.
 _ROBOT_TOPICS: Tuple[Tuple[str, str, Callable[[BagRobot, Message], None]], ...] = (
     (r"/odom([0-9]{1,4})", "nav_msgs/Odometry", BagRobot.add_odometry),
+    (r"/(?:amcl|slam)_pose([0-9]{1,4})", ESTIMATE_KIND, BagRobot.add_estimate),
     (r"/cmd_vel([0-9]{1,4})", "geometry_msgs/Twist", BagRobot.add_command),
     (f"{_NODE}/[^/]+/plan", "nav_msgs/Path", BagRobot.add_plan),
     (f"{_NODE}/feedback", "move_base_msgs/MoveBaseActionFeedback", BagRobot.add_cycle),
@@ -208,6 +210,15 @@ class TraceReader:
         time_s = stamp_ns(message.content.header.stamp) / 1e9
         self.contacts.append(contact_from_message(message.content, time_s))
 
+    def add_truth(self, message: Message) -> None:
+        """Add where the robots are, from ``/quad/truth``."""
+        time_s = stamp_ns(message.content.header.stamp) / 1e9
+        for name, place in zip(message.content.joint_names, message.content.transforms):
+            match = re.fullmatch(r"quad([0-9]{1,4})", name)
+            if match:
+                pose = pose_from(place.translation, place.rotation)
+                self._robot(int(match.group(1))).add_truth(time_s, pose)
+
     def add_transforms(self, message: Message) -> None:
         """Update the robots' odometry frames from ``/tf``."""
         for transform in message.content.transforms:
@@ -310,6 +321,7 @@ _COMMON_TOPICS: Dict[Tuple[str, str], Callable[[TraceReader, Message], None]] = 
     ("/clock", "rosgraph_msgs/Clock"): TraceReader.set_clock,
     (EVENTS_TOPIC, "quad/MissionEvent"): TraceReader.add_event,
     (CONTACTS_TOPIC, "quad/Contact"): TraceReader.add_contact,
+    (TRUTH_TOPIC, TRUTH_KIND): TraceReader.add_truth,
     ("/tf", "tf2_msgs/TFMessage"): TraceReader.add_transforms,
     ("/tf_static", "tf2_msgs/TFMessage"): TraceReader.add_transforms,
 }

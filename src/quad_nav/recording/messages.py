@@ -17,8 +17,17 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from quad_nav.costmap.cost_grid import occupancy
 from quad_nav.files.shipped import shipped
-from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, quaternion_from_yaw
+from quad_nav.geometry import (
+    Pose2D,
+    Pose3D,
+    Scan,
+    Twist2D,
+    covariance_36,
+    quaternion_from_yaw,
+)
 from quad_nav.grid import GridSpec
+from quad_nav.sim.robot_state import RobotStates
+from quad_nav.topics.estimates import ESTIMATE_KIND, TRUTH_KIND
 from quad_nav.topics.flight_info import FlightInfo
 from quad_nav.topics.markers import Marker
 
@@ -204,6 +213,20 @@ def odometry(
         (place(odom_from_base), covariance),
         (twist, _ZEROS_36),
     )
+
+
+def pose_estimate(at: Pose2D, covariance: NDArray[np.float64], stamp: int) -> Any:
+    """Build a ``geometry_msgs/PoseWithCovarianceStamped`` in ``map``; ``covariance`` is planar."""
+    estimate = place(planar_pose(at)), covariance_36(covariance)
+    return message(ESTIMATE_KIND, header("map", stamp), estimate)
+
+
+def true_states(states: RobotStates, stamp: int) -> Any:
+    """Build the message of ``TRUTH_TOPIC``."""
+    names = [f"quad{robot}" for robot in range(len(states))]
+    poses = [message("geometry_msgs/Transform", *place(one.map_from_base)) for one in states]
+    twists = [message("geometry_msgs/Twist", one.linear_mps, one.angular_radps) for one in states]
+    return message(TRUTH_KIND, header("map", stamp), names, poses, twists, [])
 
 
 def laser_scan(scan: Scan, frame: str, stamp: int) -> Any:

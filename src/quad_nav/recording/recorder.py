@@ -22,6 +22,7 @@ from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.odometry import pose_in
 from quad_nav.sim.robot_state import RobotState
 from quad_nav.topics.contacts import CONTACTS_TOPIC, contact_fields
+from quad_nav.topics.estimates import TRUTH_TOPIC
 from quad_nav.topics.flight_info import FLIGHT_TOPIC, FlightInfo, mission_info, simulation_info
 from quad_nav.topics.markers import (
     goal_markers,
@@ -89,6 +90,12 @@ class Recorder(FlightObserver):
         stamp = stamp_at(scan.stamp_s)
         content = messages.laser_scan(scan, f"Lidar{robot}", stamp)
         self._write(f"/scan{robot}", stamp, content, _SIMULATOR)
+        localization = self._flight.loop.group.localization
+        estimate = None if localization is None else localization.estimate(robot)
+        if localization is not None and estimate is not None:
+            content = messages.pose_estimate(*estimate, stamp)
+            name = localization.name
+            self._write(f"/{name}_pose{robot}", stamp, content, f"/{name}")
 
     def on_move(self, flight: Flight) -> None:
         """Write clock, transforms, odometry and paths of one step."""
@@ -101,6 +108,9 @@ class Recorder(FlightObserver):
         ]
         moved = messages.message("tf2_msgs/TFMessage", transforms)
         self._write("/tf", stamp, moved, _SIMULATOR, latched=True)
+        if flight.loop.group.localization is not None:
+            truth = messages.true_states(flight.states, stamp)
+            self._write(TRUTH_TOPIC, stamp, truth, _SIMULATOR)
         if now_s >= self._obstacles_s + OBSTACLES_PERIOD_S - 1e-6:
             self._write_obstacles(flight)
         for robot, state in enumerate(flight.states):
@@ -143,8 +153,10 @@ class Recorder(FlightObserver):
     def _transforms(self, robot: int, map_from_base: Pose3D, stamp: int) -> List[Any]:
         odom, base, lidar = f"odom{robot}", f"base_link{robot}", f"Lidar{robot}"
         map_from_odom = self._flight.simulation.map_from_frame(odom, robot)
+        localization = self._flight.loop.group.localization
+        told = map_from_odom if localization is None else localization.map_from_odom(robot)
         return [
-            messages.transform(map_from_odom.to_3d(), "map", odom, stamp),
+            messages.transform(told.to_3d(), "map", odom, stamp),
             messages.transform(pose_in(map_from_odom, map_from_base), odom, base, stamp),
             messages.transform(base_from_lidar, base, lidar, stamp),
         ]

@@ -13,13 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.config.differences import known_parameters
-from quad_nav.geometry import Pose2D
+from quad_nav.geometry import Pose2D, yaws_from_quaternions
 from quad_nav.mission.actions import Action, Event
 from quad_nav.mission.goal import Goal
+from quad_nav.mission.localization_errors import pose_errors
 from quad_nav.navigator.tick import RobotPoses, State, Tick
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.crowd_record import CrowdRecord
+from quad_nav.sim.localization import believed_states, covariances
 from quad_nav.sim.movers import Movers
 from quad_nav.sim.scene import Scene
 from quad_nav.topics.mission_events import MissionEvent, mission_event
@@ -92,6 +94,10 @@ class RobotTrace:
         mission: The goals of the goal file; empty if unknown.
         odom_frames: (time, pose in ``map``) pairs of the odometry frame, one for each change.
         said: (time, value) pairs of each topic of ``ROBOT_TOPICS``, by name; recordings have them.
+        believed: Poses (x, y, yaw) in ``map`` that the robot believes, shape (k, 3); shape (0, 3)
+            if it knows them, or nobody knows the true ones.
+        covariances: Those of its last estimates, shape (k, 3, 3), NaN before the first; shape
+            (0, 3, 3) without any.
     """
 
     name: str
@@ -111,6 +117,21 @@ class RobotTrace:
     mission: Tuple[Goal, ...] = ()
     odom_frames: Tuple[Tuple[float, Pose2D], ...] = ()
     said: Mapping[str, Tuple[Tuple[float, Any], ...]] = field(default_factory=dict)
+    believed: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
+    covariances: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3, 3)))
+
+    @property
+    def is_localized(self) -> bool:
+        """True if the robot finds its place, as far as the trace tells."""
+        return len(self.believed) > 0 or len(self.covariances) > 0
+
+    @cached_property
+    def errors(self) -> NDArray[np.float64]:
+        """Errors of the believed poses in m and rad, shape (k, 2); shape (0, 2) without any."""
+        if not len(self.believed):
+            return np.zeros((0, 2))
+        yaws_rad = yaws_from_quaternions(self.quaternions)
+        return pose_errors(self.believed, np.column_stack([self.positions_m[:, :2], yaws_rad]))
 
 
 @dataclass(frozen=True)
@@ -162,6 +183,8 @@ class TraceObserver(FlightObserver):
         self._times_s: List[float] = []
         self._positions: List[NDArray[np.float64]] = []
         self._quaternions: List[NDArray[np.float64]] = []
+        self._believed: List[NDArray[np.float64]] = []  # of all robots, as the next
+        self._covariances: List[NDArray[np.float64]] = []
         self._robots: List[_RobotRecord] = []
         self._flight: Optional[Flight] = None
         self._people: Optional[CrowdRecord] = None
@@ -179,6 +202,10 @@ class TraceObserver(FlightObserver):
         self._times_s.append(flight.now_s)
         self._positions.append(bodies.positions_m)
         self._quaternions.append(bodies.quaternions)
+        localization = flight.loop.group.localization
+        if localization is not None:
+            self._believed.append(believed_states(flight.states, localization).poses)
+            self._covariances.append(covariances(localization, len(flight.robots)))
         if self._people is not None:
             poses = flight.simulation.movers.poses(flight.now_s)
             self._people.add(flight.now_s, poses[flight.setup.scene.walker_rows, :2])
@@ -233,6 +260,9 @@ class TraceObserver(FlightObserver):
     def _robot_traces(self, flight: Flight) -> Tuple[RobotTrace, ...]:
         times_s, positions = np.array(self._times_s), np.array(self._positions)
         quaternions = np.array(self._quaternions)
+        count = len(flight.robots)
+        believed = np.array(self._believed).reshape(-1, count, 3)
+        uncertain = np.array(self._covariances).reshape(-1, count, 3, 3)
         traces = []
         for k, (record, robot) in enumerate(zip(self._robots, flight.robots)):
             commands = np.array(record.commands, dtype=float).reshape(-1, 4)
@@ -253,6 +283,8 @@ class TraceObserver(FlightObserver):
                     tuple(record.recoveries),
                     goal_traces(record.events),
                     known_parameters(robot.configuration.to_tree()),
+                    believed=believed[:, k],
+                    covariances=uncertain[:, k],
                 )
             )
         return tuple(traces)

@@ -61,6 +61,7 @@ COLUMNS: Tuple[Column, ...] = (
     Column("contacts", "", 0, lambda flight: flight.contacts, min, False),
     Column("recoveries", "", 0, lambda flight: flight.recoveries),
     Column("time spinning", "s", 1, lambda flight: flight.spin_s),
+    Column("position error, 95 %", "m", 3, lambda flight: flight.position_error_m),
     Column("control cycle", "ms", 1, lambda flight: flight.cycle_ms, min, False),
 )
 """Columns of the table of values; those without any value are left out."""

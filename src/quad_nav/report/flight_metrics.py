@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Optional, Tuple
+from typing import Any, Mapping, Optional, Tuple
 
 import numpy as np
 
 from quad_nav.mission.distances import gap_m, nearest_separations_m
+from quad_nav.mission.localization_errors import error_figures
 from quad_nav.recording.trace import FlightTrace, RobotTrace
 from quad_nav.report.measures import (
     Span,
@@ -52,6 +53,7 @@ class FlightMetrics:
     ``mission_s`` runs from sending the first goal to the end of the last one. ``covered_s`` is the
     period of a recording that does not hold the whole mission; None if it does. ``cycle_ms`` is
     the mean wall time of a control cycle; None if it is not known, as from recordings.
+    ``localization`` has the figures of the believed poses' errors; None without errors.
     """
 
     title: str
@@ -62,6 +64,7 @@ class FlightMetrics:
     contacts: int
     reason: str
     cycle_ms: Optional[float] = None
+    localization: Optional[Mapping[str, Any]] = None
     covered_s: Optional[Span] = None
 
     @property
@@ -129,6 +132,12 @@ class FlightMetrics:
         return smallest([_number(robot.min_separation_m) for robot in self.robots])
 
     @property
+    def position_error_m(self) -> Optional[float]:
+        """Error of the believed positions in 95 % of the time; None if it is not known."""
+        figures = self.localization
+        return None if figures is None else float(figures["position_error_m"]["p95"])
+
+    @property
     def path_length_m(self) -> float:
         """Length of all robots' paths."""
         return sum(robot.path_length_m for robot in self.robots)
@@ -164,6 +173,7 @@ def flight_metrics(trace: FlightTrace, tracks: Optional[Tracks] = None) -> Fligh
         len(trace.contacts),
         trace.reason,
         _mean_cycle_ms(trace),
+        _localization(trace),
         _covered_s(trace),
     )
 
@@ -176,6 +186,11 @@ def _covered_s(trace: FlightTrace) -> Optional[Span]:
         for robot in trace.robots
     )
     return None if is_whole or trace.reason else trace_span_s(trace)
+
+
+def _localization(trace: FlightTrace) -> Optional[Mapping[str, Any]]:
+    errors = [robot.errors for robot in trace.robots if len(robot.errors)]
+    return error_figures(errors) if errors else None
 
 
 def _mean_cycle_ms(trace: FlightTrace) -> Optional[float]:

@@ -5,7 +5,10 @@ from __future__ import annotations
 from functools import partial
 from typing import List, Optional, Sequence
 
+import numpy as np
+
 from quad_nav.config.differences import parameter_rows
+from quad_nav.mission.localization_errors import error_note
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report import style
 from quad_nav.report.distances import distance_panels, speed_panel
@@ -25,7 +28,12 @@ from quad_nav.report.page import MAX_STRIPS, Page, Section, picture, render
 from quad_nav.report.panels import plot_section
 from quad_nav.report.paths import flown_paths
 from quad_nav.report.plotly_figures import distance_plot, paths_plot, timeline_plot
-from quad_nav.report.robot_plots import cycle_plot, has_wall_times, motion_plot
+from quad_nav.report.robot_plots import (
+    cycle_plot,
+    has_wall_times,
+    localization_plot,
+    motion_plot,
+)
 from quad_nav.report.timeline import timeline
 
 
@@ -122,6 +130,7 @@ def _curves(
             plots=(timeline_plot(goals),),
             paper=(picture("timeline", "Goals over time", lambda: timeline_picture(goals)),),
         ),
+        *_localization(trace, flight),
         _motion(trace, flight),
         _cycles(trace),
     ]
@@ -163,6 +172,20 @@ def _motion(trace: FlightTrace, flight: FlightMetrics) -> Section:
     if not rows:
         return Section("motion", "Motion", caption)
     return plot_section("motion", "Motion", caption, motion_plot(trace, rows))
+
+
+def _localization(trace: FlightTrace, flight: FlightMetrics) -> List[Section]:
+    """Return the section of a flight whose robots find their places."""
+    localized = [k for k, robot in enumerate(trace.robots) if robot.is_localized]
+    if not localized:
+        return []
+    errors = [float(np.max(robot.errors[:, 0], initial=0.0)) for robot in trace.robots]
+    shown = sorted(sorted(localized, key=lambda k: -errors[k])[: style.MAX_ROWS])
+    caption = "" if flight.localization is None else f"{error_note(flight.localization)} "
+    caption += "A robot that is farther off than it believes does not know that it may be lost."
+    if len(shown) < len(localized):
+        caption += f" The {len(shown)} quadcopters with the largest errors are shown."
+    return [plot_section("localization", "Localization", caption, localization_plot(trace, shown))]
 
 
 def _cycles(trace: FlightTrace) -> Section:

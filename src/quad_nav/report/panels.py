@@ -151,6 +151,9 @@ def _reach(errors: Optional[Json]) -> Optional[Tuple[Sequence[float], Sequence[f
 def _scatter(axes: Axes, trace: Json) -> None:
     x, y, marker, line = trace["x"], _known(trace["y"]), trace.get("marker"), trace.get("line", {})
     name, reach = trace.get("name", ""), _reach(trace.get("error_y"))
+    if "fill" in trace:
+        ink, is_step = _ink(trace["fillcolor"]), line.get("shape") == "hv"
+        axes.fill_between(_known(x), y, color=ink, step="post" if is_step else None, lw=0)
     if "lines" in trace["mode"]:
         axes.plot(
             _known(x),

@@ -1,4 +1,4 @@
-"""Plots of each robot over time: its motion, and its control cycles."""
+"""Plots of each robot over time: its motion, its localization and its control cycles."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ from quad_nav.report.plot import (
 
 _PANEL_PX, _CYCLES_PX = 120, 260
 _MARGIN = 0.05  # of the range of an axis, in parts of the values' range
+_LEAST_TOP = 0.01  # m or rad, of an axis of errors
 _TAIL = 0.001  # smallest part of the cycles that the distribution shows
 _TAIL_POINTS = 200
 
@@ -79,6 +80,55 @@ def _limits(traces: Sequence[Json]) -> List[float]:
     low, high = min(values), max(values)
     margin = _MARGIN * max(high - low, 0.1)
     return [low - margin, high + margin]
+
+
+def localization_plot(trace: FlightTrace, shown: Sequence[int]) -> Plot:
+    """Draw the errors of some robots' believed poses, over twice the standard deviations."""
+    columns = [
+        [_errors(trace.robots[number], number, part, number == shown[0]) for number in shown]
+        for part in (0, 1)
+    ]
+    tops = [max(top for top, _ in column) for column in columns]
+    panels: List[Panel] = []
+    for row, number in enumerate(shown):
+        for part, quantity in enumerate(("position error (m)", "yaw error (rad)")):
+            name = plot_text(trace.robots[number].name)
+            time = axis("time (s)" if number == shown[-1] else "", range=list(trace_span_s(trace)))
+            if panels:
+                time["matches"] = "x"
+            up = axis("", range=[0.0, (1.0 + _MARGIN) * tops[part]])
+            panels.append(Panel(f"{name}: {quantity}", columns[part][row][1], time, up))
+    alt = "Errors of the believed poses over time"
+    return panel_plot("localization", alt, panels, 2, _PANEL_PX, legend=True)
+
+
+def _errors(robot: RobotTrace, number: int, part: int, is_first: bool) -> Tuple[float, List[Json]]:
+    """Return where the axis of an error ends, and its traces: 0 is that of the position, 1 yaw.
+
+    The axis shows what most deviations reach, so that a spread at the start hides no error.
+    """
+    legend = {"showlegend": is_first and part == 0}
+    top, traces = _LEAST_TOP, []
+    if len(robot.covariances):
+        x, y, yaw = robot.covariances[:, [0, 1, 2], [0, 1, 2]].T
+        variances = yaw if part else x + y
+        believed = 2.0 * np.sqrt(np.where(variances >= 0.0, variances, np.nan))
+        known = believed[np.isfinite(believed)]
+        top = max(top, float(np.percentile(known, 95)) if len(known) else 0.0)
+        line = {"color": rgb(number, 0.35), "width": 1, "shape": "hv"}
+        band = {"fill": "tozeroy", "fillcolor": rgb(number, 0.15), "line": line}
+        group = {"name": "2 standard deviations, as believed", "legendgroup": "believed"}
+        traces.append(_line(robot.times_s, believed, **band, **group, **legend))
+    if len(robot.errors):
+        error = robot.errors[:, part]
+        worst = smallest_samples(-error, 1)
+        line = {"color": rgb(number), "width": 1.5}
+        group = {"name": "error", "legendgroup": "error"}
+        traces.append(
+            lines(robot.times_s[worst], error[worst], (2, 4), line=line, **group, **legend)
+        )
+        top = max(top, float(error.max()))
+    return top, traces
 
 
 def cycle_plot(trace: FlightTrace) -> Plot:

@@ -21,7 +21,13 @@ Estimate = Tuple[Pose2D, NDArray[np.float64]]
 
 
 class Localization(Protocol):
-    """Finds the odometry frames of all robots in ``map``."""
+    """Finds the odometry frames of all robots in ``map``.
+
+    Attributes:
+        name: Name of the method, with which the topic of its estimates begins.
+    """
+
+    name: str = ""
 
     def add_scan(
         self, robot: int, scan: Scan, odom_from_base: Pose3D, odom_from_lidar: Pose3D
@@ -51,8 +57,15 @@ class Localization(Protocol):
         return False
 
 
+_UNKNOWN: NDArray[np.float64] = np.full((3, 3), np.nan)
 LocalizationMaker = Callable[[Scene, int], Localization]
 """Maker of the localization of a flight: of its scene, and the number of robots."""
+
+
+def covariances(localization: Localization, robots: int) -> NDArray[np.float64]:
+    """Return the covariances float64[n, 3, 3] of the robots' last estimates; NaN before them."""
+    estimates = [localization.estimate(robot) for robot in range(robots)]
+    return np.array([_UNKNOWN if one is None else one[1] for one in estimates])
 
 
 def believed_states(states: RobotStates, localization: Optional[Localization]) -> RobotStates:

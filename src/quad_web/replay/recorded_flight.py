@@ -6,7 +6,7 @@ import bisect
 import math
 import re
 import time
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Callable, Dict, Hashable, Iterable, List, Mapping, Optional, Tuple
 
@@ -216,6 +216,9 @@ class RecordedFlight:
             if number is None:
                 return None
             return number, lambda: line_item("plan", robot, track.robot.plans[number][1])
+        if layer == "localization":
+            located = track.located(time_s)
+            return None if located is None else (time_s, partial(located.item, robot))
         if layer == "cell":
             return time_s, lambda: self._cell(robot, time_s)
         topic = self._topics.get((layer, robot))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 import math
+from dataclasses import replace
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from quad_nav.topics.right_of_way import RightOfWay
 from quad_nav.topics.robot_topics import COLUMNS, goal_distance_m
 from quad_web.view import rows
 from quad_web.view.items import TRAIL_POINTS, TRAIL_SPACING_M, UNKNOWN_BODY
+from quad_web.view.localization import Located
 
 _DEFAULT_RECOVERIES = 4  # of move_base
 LOST_AFTER_S = 1.0
@@ -88,6 +90,20 @@ class RobotTrack:
         number = int(np.searchsorted(times_s, time_s, side="right")) - 1
         return max(0.0, time_s - float(times_s[max(number, 0)]))
 
+    def located(self, time_s: float) -> Optional[Located]:
+        """Return where the robot believes itself; None if it knows its place, or before a pose."""
+        robot = self.robot
+        number = int(np.searchsorted(robot.times_s, time_s, side="right")) - 1
+        if number < 0 or not robot.is_localized:
+            return None
+        x_m, y_m, z_m = robot.positions_m[number].tolist()
+        here = Pose3D(x_m, y_m, z_m, tuple(robot.quaternions[number].tolist())).to_2d()
+        covariances = robot.covariances
+        known = Located(covariance=covariances[number]) if len(covariances) else Located()
+        if not len(robot.believed):
+            return replace(known, pose=here)
+        return replace(known, pose=Pose2D(*robot.believed[number].tolist()), truth=here)
+
     def trail_end(self, time_s: float) -> int:
         """Return how many points of the spaced path there are up to a time."""
         end = int(np.searchsorted(self.robot.times_s, time_s, side="right"))
@@ -142,6 +158,7 @@ class RobotTrack:
         is_active = leg is not None and self.is_active(leg, time_s)
         is_done = leg is not None and not is_active and 0 < len(goals) <= leg.index + 1
         right = self._said("right_of_way", time_s) or RightOfWay()
+        located = self.located(time_s)
         return rows.RobotNow(
             self._state(time_s),
             right.decision,
@@ -153,6 +170,7 @@ class RobotTrack:
             said=self._columns(time_s),
             recoveries=self._recoveries(time_s),
             age_s=age_s,
+            localization=None if located is None else located.row(),
         )
 
     def _said(self, name: str, time_s: float) -> Any:

@@ -234,3 +234,57 @@ def test_animations_that_cannot_be_written(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", "")
     (missing,) = animation_faults(tmp_path / "flight.mp4")
     assert "needs the program ffmpeg" in missing
+
+
+def localized(number, east_m, variance=0.01):
+    """A robot that believes itself so far east, and turned by a tenth of that in rad."""
+    one = robot(number, (1.0, 1.0 + number), (0.3, 0.0), goals=(DONE,))
+    believed = np.column_stack([one.positions_m[:, :2], np.zeros(len(one.times_s))])
+    covariances = np.tile(np.diag([variance, 3.0 * variance, 0.0001]), (len(one.times_s), 1, 1))
+    covariances[0] = np.nan
+    offset = (east_m, 0.0, 0.1 * east_m)
+    return replace(one, believed=believed + offset, covariances=covariances)
+
+
+def localization_of(page):
+    return figures_of(page.html)["localization"]
+
+
+def test_errors_of_robots_that_find_their_places():
+    """Half of the errors are 0.02 m and half 0.06 m; two deviations are twice the root of 0.04."""
+    page = flight_page(flight(localized(0, 0.02), localized(1, 0.06)))
+    assert Parsed(page.html).sections == [*SECTIONS[:4], "localization", *SECTIONS[4:]]
+    assert "0.040, 0.060 m" in page.html
+    assert "Localization: 0.040 m and 0.004 rad from the truth" in page.html
+    curves = {(one["name"], one["yaxis"]): one["y"] for one in localization_of(page)["data"]}
+    believed = "2 standard deviations, as believed"
+    assert curves["error", "y"] == pytest.approx([0.02] * 401)
+    assert curves["error", "y3"] == pytest.approx([0.06] * 401)
+    assert curves["error", "y4"] == pytest.approx([0.006] * 401)
+    assert curves[believed, "y"][0] is None
+    assert curves[believed, "y"][1:] == pytest.approx([0.4] * 400)
+    assert curves[believed, "y2"][1:] == pytest.approx([0.02] * 400)
+    assert localization_of(page)["layout"]["yaxis"]["range"] == pytest.approx([0.0, 0.42])
+    assert [one.name for one in page.pictures].count("localization") == 1
+
+
+def test_a_wide_spread_at_the_start_hides_no_error():
+    one = localized(0, 0.02)
+    one.covariances[1:20] *= 1000.0
+    shown = localization_of(flight_page(flight(one)))
+    assert shown["layout"]["yaxis"]["range"] == pytest.approx([0.0, 0.42])
+
+
+def test_only_the_quadcopters_with_the_largest_errors_are_shown():
+    page = flight_page(flight(*(localized(k, 0.01 * k) for k in range(9))))
+    titles = {one["text"] for one in localization_of(page)["layout"]["annotations"]}
+    assert len(titles) == 16
+    assert not any("quad0" in title for title in titles)
+    assert "The 8 quadcopters with the largest errors are shown." in page.html
+
+
+def test_without_the_truth_there_are_deviations_alone():
+    page = flight_page(flight(replace(localized(0, 0.02), believed=np.zeros((0, 3)))))
+    shown = {one["name"] for one in localization_of(page)["data"]}
+    assert shown == {"2 standard deviations, as believed"}
+    assert "from the truth" not in page.html
