@@ -31,6 +31,8 @@ CELL_M = 0.05
 NODES = {"amcl": "/amcl0", "slam": "/slam"}
 _ERRORS = OdometryErrors(per_m=0.05, per_rad=0.05)
 _START = STARTS[0]
+_MOST_PARTICLES = 500
+"""At sums of arrays above 256 kB numpy looks at its callers, and crashes in a greenlet."""
 
 
 class LocalizedWorld(NavigatorWorld):
@@ -39,7 +41,7 @@ class LocalizedWorld(NavigatorWorld):
     Attributes:
         spoilt: What quadcopter 0 sends with NaN, of "ranges", "odometry pose" and "mount".
         jump_m: How far its odometry is beside what it has measured.
-        frame: The last transform from `odom0` to `map`, its stamp in s and pose; None before.
+        frame: The last transform from `odom0` to `map`, `flown_s` when it came; None before.
     """
 
     def __init__(self, localization, has_map=True, *clock):
@@ -55,6 +57,7 @@ class LocalizedWorld(NavigatorWorld):
         frames = {"odom_frame_id": "odom0", "base_frame_id": "base_link0", "use_map_topic": True}
         start = {"initial_pose_x": _START.x_m, "initial_pose_y": _START.y_m, "seed": 1}
         params = read_yaml(shipped("localization", "amcl.yaml"))
+        params["max_particles"] = _MOST_PARTICLES
         self.graph.parameters["~"] = {**params, **frames, **start}
         self._map = rospy.Publisher("/map", OccupancyGrid, queue_size=1, latch=True)
         if has_map:
@@ -116,7 +119,7 @@ class LocalizedWorld(NavigatorWorld):
         for one in message.transforms:
             if (one.header.frame_id, one.child_frame_id) == ("map", "odom0"):
                 pose = conversions.pose_from_transform(one).to_2d()
-                self.frame = one.header.stamp.to_sec(), pose
+                self.frame = self.flown_s, pose
 
     def _step(self):
         super()._step()

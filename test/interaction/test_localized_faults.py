@@ -10,12 +10,19 @@ import pytest
 pytest.importorskip("rospy")
 pytest.importorskip("greenlet")
 
+from hypothesis import strategies as st  # noqa: E402
+from hypothesis.stateful import (  # noqa: E402
+    RuleBasedStateMachine,
+    initialize,
+    invariant,
+    rule,
+)
 from interaction.localized_world import NODES, WRONG, LocalizedWorld  # noqa: E402
-from interaction.machines import assert_sound  # noqa: E402
+from interaction.machines import assert_sound, machine_settings  # noqa: E402
 
 from quad_nav.geometry import Pose2D  # noqa: E402
 
-GOAL, FAR = Pose2D(6.5, 6.5), Pose2D(1e5, 1e5)
+GOAL, START, FAR = Pose2D(6.5, 6.5), Pose2D(1.5, 1.5), Pose2D(1e5, 1e5)
 LOST = "lost: scans do not fit the map"
 HOVERS_AFTER_S, FAULT_S, RESUMES_WITHIN_S = 1.5, 3.0, 6.0
 NEAR_M = 0.15
@@ -146,3 +153,57 @@ def test_no_map_and_a_map_that_comes_late(world):
     assert world.has_logged("map dropped: origin (nan")
     world.send_map()
     assert_flies_on(world)
+
+
+class LocalizedMachine(RuleBasedStateMachine):
+    """Faults in any order and combination.
+
+    Attributes:
+        world: The quadcopters and their nodes.
+        faults: Those that have begun.
+    """
+
+    @initialize(name=st.sampled_from(sorted(NODES)))
+    def begin(self, name):
+        self.world, self.faults = LocalizedWorld(name, True, 100 * 10**9), []
+        self.world.send_goal(GOAL)
+        self.world.run(1.0)
+
+    def teardown(self):
+        if hasattr(self, "world"):
+            self.world.close()
+
+    @rule(seconds=st.sampled_from([0.1, 0.5, 1.5, 3.0]))
+    def time_passes(self, seconds):
+        self.world.run(seconds)
+
+    @rule(fault=st.sampled_from(sorted(FAULTS)))
+    def a_fault_begins(self, fault):
+        if self.world.localization in FAULTS[fault].names:
+            FAULTS[fault].begins(self.world)
+            self.faults.append(FAULTS[fault])
+
+    @rule()
+    def all_faults_end(self):
+        """And a person says where the quadcopter is, and sends it to the other end."""
+        for fault in self.faults:
+            fault.ends(self.world)
+        self.faults.clear()
+        self.world.run(2.0)
+        self.world.give(self.world.bodies[0].pose)
+        self.world.send_goal(max(GOAL, START, key=self.world.bodies[0].pose.distance_to))
+        assert_flies_on(self.world)
+
+    @invariant()
+    def no_node_crashes(self):
+        assert_sound(self.world.graph)
+
+    @invariant()
+    def without_a_place_it_hovers(self):
+        came_s, _ = self.world.frame
+        if self.world.flown_s - came_s > HOVERS_AFTER_S:
+            assert self.world.is_hovering
+
+
+TestLocalizedMachine = LocalizedMachine.TestCase
+TestLocalizedMachine.settings = machine_settings(few=8, share=0.05)

@@ -148,9 +148,12 @@ class SlamNode:
             odom_from_base = self._transforms.lookup(robot.odom, robot.base, stamp)
             odom_from_lidar = self._transforms.lookup(robot.odom, message.header.frame_id, stamp)
         except TransformUnavailable as error:
-            if error.later and len(robot.scans) < _QUEUE:
-                return False
             reason = excerpt(str(error))
+            latest = self._transforms.locate(robot.odom, robot.base, stamp.to_sec(), 0.0)
+            if latest is None and (error.later or robot.taken_s < 0.0):
+                if len(robot.scans) == _QUEUE:
+                    robot.warnings.warn(f"{robot.name}: scans wait for tf: {reason}")
+                return False
             robot.warnings.warn(f"{robot.name}: /scan{robot.number}: message dropped: {reason}")
             return True
         if stamp.to_sec() == robot.taken_s:
