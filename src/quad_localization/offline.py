@@ -16,7 +16,7 @@ from quad_nav.errors import InputError
 from quad_nav.files.document import read_yaml
 from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, Pose3D, Scan
-from quad_nav.mission.localization_errors import error_figures, error_note, pose_errors
+from quad_nav.mission.localization_errors import error_figures, pose_errors
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.scenario.scene_map import scene_map
 from quad_nav.sim.localization import Estimate, Localization, believed_states
@@ -156,11 +156,6 @@ class LocalizationErrors(FlightObserver):
         """Note the errors of now."""
         believed = believed_states(flight.states, flight.loop.group.localization)
         self.errors.append(pose_errors(believed.poses, flight.states.poses))
-
-    @property
-    def note(self) -> str:
-        """The figures for people."""
-        return error_note(self.figures())
 
     @property
     def facts(self) -> Dict[str, Any]:

@@ -22,11 +22,17 @@ from quad_nav.mission.flight_log import Leg  # noqa: E402
 from quad_nav.mission.goal import Goal  # noqa: E402
 from quad_nav.mission.summary import MissionSummary, RobotSummary, to_json  # noqa: E402
 from quad_nav.ros.common.conversions import pose_array_message, pose_message  # noqa: E402
-from quad_nav.ros.common.packed_messages import STATES_TOPIC, States, states_message  # noqa: E402
+from quad_nav.ros.common.packed_messages import (  # noqa: E402
+    STATES_TOPIC,
+    States,
+    pose_row,
+    states_message,
+)
 from quad_nav.sim.motion import Motion, Walkers  # noqa: E402
 from quad_nav.sim.movers import Movers  # noqa: E402
 from quad_nav.sim.obstacles import Box  # noqa: E402
 from quad_nav.sim.scene import MovingObstacle, Scene, Walls  # noqa: E402
+from quad_nav.topics.estimates import TRUTH_TOPIC  # noqa: E402
 from quad_nav.topics.mission_events import SUMMARY_TOPIC  # noqa: E402
 from quad_nav.topics.obstacle_poses import POSES_TOPIC  # noqa: E402
 from quad_nav.topics.tracked_obstacles import obstacle_fields  # noqa: E402
@@ -157,7 +163,7 @@ def test_a_robot_is_localized_as_amcl_or_slam_tell():
     lost = DiagnosticStatus(name="quad1: localization", level=2, message="lost: scans do not fit")
     hear_health(DiagnosticArray(status=[lost]))
     topics = localizations.topics(shown)
-    assert set(topics) == {"/amcl_pose0", "/particlecloud0", "/slam_pose1"}
+    assert set(topics) == {"/amcl_pose0", "/particlecloud0", "/slam_pose1", TRUTH_TOPIC}
     pose = PoseWithCovariance(pose_message(Pose3D(2.0, 3.0, 1.0)), [float(i) for i in range(36)])
     deliver(topics["/amcl_pose0"], PoseWithCovarianceStamped(Header(frame_id="map"), pose))
     places = np.column_stack((np.arange(1000.0), np.zeros(1000), np.zeros(1000)))
@@ -176,6 +182,27 @@ def test_a_robot_is_localized_as_amcl_or_slam_tell():
     assert localizations.located(1).row() == {"is_lost": True, "searches": False}
     deliver(topics["/amcl_pose0"], PoseWithCovarianceStamped(Header(frame_id="odom0"), pose))
     assert localizations.items(shown) == []  # dropped, with a warning
+
+
+def test_the_error_is_the_distance_from_where_the_robot_was_at_the_stamp():
+    """It believes to be at (2, 3) at 1.5 s, when it was at (2.3, 3.4) and turned by 0.1 rad."""
+    health = FleetHealth(1)
+    localizations, shown = Localizations(1, health), frozenset((0,))
+    hear_health = health.topics()["/diagnostics"].callback
+    hear_health(DiagnosticArray(status=[DiagnosticStatus(name="quad0: localization")]))
+    topics = localizations.topics(shown)
+    for stamp_s, x_m in ((1.25, 9.0), (1.5, 2.3), (1.75, 9.0)):
+        row = [pose_row(Pose3D(x_m, 3.4, 1.0, quaternion_from_yaw(0.1)))]
+        true = States(stamp_s, "map", np.array([0]), np.array(row), np.zeros((1, 6)))
+        deliver(topics[TRUTH_TOPIC], states_message(true))
+    pose = PoseWithCovariance(pose_message(Pose3D(2.0, 3.0, 1.0)), [0.0] * 36)
+    for stamp_s in (1.51, 1.6):
+        header = Header(0, rospy.Time(stamp_s), "map")
+        deliver(topics["/slam_pose0"], PoseWithCovarianceStamped(header, pose))
+        localizations.items(shown)
+        row = localizations.located(0).row()
+        error = (row.get("error_m"), row.get("error_rad"))
+        assert error == (pytest.approx((0.5, 0.1)) if stamp_s == 1.51 else (None, None))
 
 
 @pytest.mark.parametrize("cut", [0, 10, 20, 30, 90])

@@ -42,6 +42,8 @@ class LocalizedFlight(FlightCase):
         goals = [goal for robot in result["robots"] for goal in robot["goals"]]
         self.assertEqual([goal["reached"] for goal in goals], 6 * [True], goals)
         self.assertEqual(result["contacts"], [])
+        error_m = result["localization"]["position_error_m"]
+        self.assertTrue(0.0 < error_m["median"] < error_m["p95"] < 0.1, error_m)
         for i in (0, 1):
             drift_m = drift_of(buffer, i)
             self.assertGreater(drift_m, 0.1, "odometry has drifted, and somebody corrects it")
@@ -73,6 +75,12 @@ class LocalizedFlight(FlightCase):
         answer = actions.call("set_pose", 0, here)
         self.assertTrue(answer.ok, answer.text)
         self.wait(lambda: len(poses.messages) > count, "a pose after that of a person")
+
+        def error_m():
+            return state.item("status").data["rows"][0]["localization"].get("error_m")
+
+        self.wait(lambda: error_m() is not None, "the error of that pose")
+        self.assertLess(error_m(), 0.2)
         if name != "amcl":
             return
         self.wait(lambda: len(state.item("localization/0").arrays["points"]) > 100, "particles")

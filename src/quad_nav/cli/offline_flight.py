@@ -223,7 +223,7 @@ def _fly(
         facts = {**facts, **observer.facts}
     summary = replace(flown, facts=facts, interventions=interventions)
     width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns
-    overview = "\n".join([table(summary, width), *filter(None, (one.note for one in observers))])
+    overview = table(summary, width)
     if not quiet:
         echo_lines(overview, err=outputs.use_stdout)
     else:  # the table has the reason to end early, such as a recording on a full disk

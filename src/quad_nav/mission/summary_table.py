@@ -8,6 +8,7 @@ from typing import Container, Iterable, List, Optional, Sequence, Tuple
 
 from quad_nav.errors import printable
 from quad_nav.mission.flight_log import INTERRUPTED, Leg
+from quad_nav.mission.localization_errors import error_note
 from quad_nav.mission.summary import MissionSummary, RobotSummary
 from quad_nav.sim.contacts import Contact
 
@@ -43,6 +44,9 @@ def table(summary: MissionSummary, width: int = DEFAULT_WIDTH) -> str:
     if summary.contacts:
         parts.append(_contact_table(summary.contacts, width))
     parts.append(_verdict(summary, width))
+    figures = summary.facts.get("localization")
+    if figures is not None:
+        parts[-1] += f"\n{error_note(figures)}"
     return "\n\n".join(parts)
 
 

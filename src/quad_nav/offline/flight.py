@@ -51,11 +51,6 @@ class FlightObserver:
         """Facts about the flight, by the keys of ``mission.summary.FACTS``."""
         return {}
 
-    @property
-    def note(self) -> str:
-        """Line below the tables of the flight, "" for none."""
-        return ""
-
     def on_start(self, flight: Flight) -> None:
         """Handle the start: everything is in place at time 0, nothing has moved."""
 

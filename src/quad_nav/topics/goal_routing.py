@@ -1,4 +1,4 @@
-"""Goals of one RViz tool for a whole fleet: select a quadcopter, choose who gets a goal."""
+"""RViz tools for a whole fleet: select a quadcopter, choose who gets a goal or a pose."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Positions = Mapping[int, Tuple[float, float]]
 
 @dataclass(frozen=True)
 class Route:
-    """The quadcopter that gets a goal, and a phrase with the reason for the log."""
+    """The quadcopter that gets a goal or a pose, and a phrase with the reason for the log."""
 
     robot: int
     reason: str
 
 
 class GoalRouter:
-    """Routes goals to the selected quadcopter, or without a selection to the nearest one.
+    """Routes goals and poses to the selected quadcopter, or without a selection to the nearest one.
 
     Attributes:
         selected: Number of the selected quadcopter, or None.
@@ -48,13 +48,13 @@ class GoalRouter:
             self.selected = None
             return (
                 f"no quadcopter within {SELECT_WITHIN_M:g} m of the click at ({x_m:.2f}, "
-                f"{y_m:.2f}) m, none selected; each goal goes to the nearest one"
+                f"{y_m:.2f}) m, none selected; each goal or pose goes to the nearest"
             )
         if found[0] == before:
             self.selected = None
-            return f"quad{before} deselected; each goal goes to the nearest quadcopter"
+            return f"quad{before} deselected; each goal or pose goes to the nearest"
         self.selected = found[0]
-        return f"quad{self.selected} selected; the next goals go to it"
+        return f"quad{self.selected} selected; the next goals and poses go to it"
 
     def route(self, x_m: float, y_m: float, positions: Positions) -> Optional[Route]:
         """Choose who gets a goal at a position in ``map``; None if no position is known."""
@@ -64,6 +64,19 @@ class GoalRouter:
         if found is None:
             return None
         return Route(found[0], f"nearest, {found[1]:.2f} m from it")
+
+    def route_pose(
+        self, x_m: float, y_m: float, positions: Positions, robots: int
+    ) -> Optional[Route]:
+        """Choose who is told to be at a position in ``map``; None if that is not clear.
+
+        A quadcopter that does not know its place comes before one that does: a wrong pose would
+        let that one err, too.
+        """
+        lost = sorted(set(range(robots)) - set(positions))
+        if self.selected is not None or not lost:
+            return self.route(x_m, y_m, positions)
+        return Route(lost[0], "the only one without a place") if len(lost) == 1 else None
 
 
 def _nearest(x_m: float, y_m: float, positions: Positions) -> Optional[Tuple[int, float]]:

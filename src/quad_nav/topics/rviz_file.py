@@ -64,16 +64,13 @@ def _of_robot(group: Dict[str, Any], number: int, robots: int) -> Dict[str, Any]
     """Copy the template with another quadcopter's number and colours."""
     own = _renumbered(group, number)
     for display in own["Displays"]:
-        colour = _rgb(number)
-        if display.get("Color") == _rgb(0):
-            display["Color"] = colour
         if robots > MAX_WITH_ALL_DISPLAYS:
             display["Enabled"] = display["Value"] = display["Name"] in _ENABLED_FOR_MANY
     return own
 
 
 def _renumbered(value: Any, number: int) -> Any:
-    """Replace names and topics of quadcopter 0 by those of another."""
+    """Replace names, topics and colours of quadcopter 0 by those of another."""
     if isinstance(value, dict):
         return {key: _renumbered(one, number) for key, one in value.items()}
     if isinstance(value, list):
@@ -81,6 +78,8 @@ def _renumbered(value: Any, number: int) -> Any:
     if isinstance(value, str):
         if value == "Quadcopter 0":
             return f"Quadcopter {number}"
+        if value == _rgb(0):
+            return _rgb(number)
         if value.startswith("/"):
             return (
                 value.replace("/move_base0/", f"/move_base{number}/", 1)
@@ -98,7 +97,7 @@ def _with_number(value: Any, number: int) -> Any:
 def _tools(tools: Sequence[Dict[str, Any]], robots: int) -> List[Dict[str, Any]]:
     """Return numbered tools for each quadcopter, if these are few, and all others.
 
-    Larger fleets have the tools that route goals to the selected or the nearest quadcopter.
+    Larger fleets have the tools of `goal_router`: for the selected or the nearest quadcopter.
     """
     made: List[Dict[str, Any]] = []
     for tool in tools:

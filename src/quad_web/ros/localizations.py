@@ -11,8 +11,12 @@ from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
 from numpy.typing import NDArray
 
 from quad_nav.errors import excerpt
+from quad_nav.geometry import Pose2D
 from quad_nav.ros.common.conversions import pose_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
+from quad_nav.ros.common.packed_messages import StatesMessage
+from quad_nav.ros.common.true_states import TrueStates
+from quad_nav.topics.estimates import TRUTH_TOPIC, planar_covariance
 from quad_nav.topics.validation import pose_problem
 from quad_web.ros.health import FleetHealth
 from quad_web.ros.intake import Newest, Topic
@@ -33,6 +37,7 @@ class Localizations:
         self._robots, self._health = range(robots), health
         self._poses: Dict[str, Newest] = {}  # by topic, as the next
         self._clouds: Dict[str, Newest] = {}
+        self._true = TrueStates()
         self._last: Dict[int, Located] = {}
         self._shown: Dict[int, Tuple[Located, bool]] = {}  # the last items: of what, and lost
         self._warnings = ThrottledWarnings()
@@ -46,7 +51,9 @@ class Localizations:
             one: self._poses.get(one) or Newest(one, PoseWithCovarianceStamped) for one in poses
         }
         self._clouds = {one: self._clouds.get(one) or Newest(one, PoseArray) for one in clouds}
-        return {name: one.topic for name, one in {**self._poses, **self._clouds}.items()}
+        topics = {name: one.topic for name, one in {**self._poses, **self._clouds}.items()}
+        truth = {TRUTH_TOPIC: Topic(StatesMessage, self._true.add)}
+        return {**topics, **(truth if poses else {})}
 
     def located(self, robot: int) -> Optional[Located]:
         """Return where a robot believes itself, None without a localization."""
@@ -101,9 +108,10 @@ class Localizations:
         problem = pose_problem(pose) or _frame_problem(frame)
         if problem:
             raise ValueError(problem)
-        covariance = np.array(message.pose.covariance, np.float64).reshape(6, 6)
-        planar = covariance[np.ix_((0, 1, 5), (0, 1, 5))]
-        self._last[robot] = replace(last, pose=pose.to_2d(), covariance=planar)
+        covariance = planar_covariance(message.pose.covariance)
+        true = self._true.find(robot, message.header.stamp.to_sec())
+        truth = None if true is None else Pose2D(*true.tolist())
+        self._last[robot] = replace(last, pose=pose.to_2d(), covariance=covariance, truth=truth)
 
 
 def cloud_places(data: bytes) -> NDArray[np.float64]:

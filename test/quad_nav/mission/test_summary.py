@@ -151,6 +151,20 @@ SUMMARY = mission(
 )
 
 
+def test_the_table_ends_with_the_errors_of_localized_robots():
+    figures = {
+        "position_error_m": {"median": 0.0164, "p95": 0.035},
+        "yaw_error_rad": {"median": 0.002, "p95": 0.01},
+    }
+    *before, last = table(mission(leg(), facts={"localization": figures})).splitlines()
+    assert before[-1].startswith("Mission succeeded")
+    assert last == (
+        "Localization: 0.016 m and 0.002 rad from the truth, in 95 % of the time below 0.035 m and"
+        " 0.010 rad."
+    )
+    assert "Localization" not in table(mission(leg(), facts={"localization": None}))
+
+
 def test_the_table_has_figures_and_reasons():
     text = table(SUMMARY)
     assert max(map(len, text.splitlines())) <= 100

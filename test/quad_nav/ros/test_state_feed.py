@@ -22,9 +22,11 @@ from quad_nav.ros.common.packed_messages import (  # noqa: E402
 )
 from quad_nav.ros.common.transforms import TransformUnavailable  # noqa: E402
 from quad_nav.ros.sequencer.mission import MissionRunner  # noqa: E402
-from quad_nav.ros.sequencer.odometry import OdometryIntake  # noqa: E402
+from quad_nav.ros.sequencer.odometry import OdometryIntake, Track  # noqa: E402
 from quad_nav.ros.sequencer.state_feed import StateFeed  # noqa: E402
+from quad_nav.ros.sequencer.truth import TruthTopic  # noqa: E402
 from quad_nav.scenario.mission_setup import read_setup  # noqa: E402
+from quad_nav.topics.estimates import TRUTH_TOPIC  # noqa: E402
 
 
 @pytest.fixture
@@ -125,6 +127,34 @@ def test_a_robot_goes_on_when_its_poses_come_from_another_topic(ros):
     assert track.poses[:, 0].tolist() == [3.01]
     assert not odometry.is_jumping and not track.relocated.any()
     assert odometry.take([(1.2, at(3.02))], (), 1.2).poses[:, 0].tolist() == [3.02]
+
+
+def test_errors_are_those_at_the_stamps_of_the_truth(ros):
+    """Robot 1 believes to be 0.3 m east and 0.4 m north of where it is, and turned by 0.2 rad."""
+    truth = TruthTopic()
+    assert truth.facts == {}
+    for stamp_s in (1.0, 1.025, 1.05):
+        ros.set_time(stamp_s)
+        deliver(TRUTH_TOPIC, states([at(9.0), at(stamp_s, 2.0, 3.1)]))
+    believed = np.array([(1.3, 2.4, 1.0, 3.3 - 2.0 * math.pi), (1.325, 2.4, 1.0, 2.9)])
+    stamps_s = np.array([1.0, 1.025, 1.075])
+    poses = np.vstack([believed, (50.0, 50.0, 1.0, 0.0)])  # of the last stamp there is no truth
+    truth.compare(1, Track(stamps_s, poses, np.zeros(3, bool)))
+    truth.compare(2, Track(stamps_s, poses, np.zeros(3, bool)))
+    figures = truth.facts["localization"]
+    assert figures["position_error_m"] == {"median": 0.5, "p95": 0.5}
+    assert figures["yaw_error_rad"] == {"median": 0.2, "p95": 0.2}
+    truth.forget()
+    assert truth.facts == {}
+
+
+def test_a_truth_that_is_not_valid_is_dropped(ros):
+    truth = TruthTopic()
+    deliver(TRUTH_TOPIC, states([at(1.0)], frame="odom0"))
+    assert any("/quad/truth: message dropped: frame 'odom0'" in line for line in ros.log.lines)
+    deliver(TRUTH_TOPIC, states([at(math.nan)]))
+    truth.compare(0, Track(np.array([rospy.get_time()]), np.zeros((1, 4)), np.zeros(1, bool)))
+    assert truth.facts == {}
 
 
 def test_a_goal_with_a_yaw_is_reached_between_two_steps(ros, tmp_path):

@@ -111,6 +111,13 @@ def test_rviz_shows_every_quadcopter_in_its_colour():
         tracked = next(one for one in group["Displays"] if one["Name"] == "Tracked obstacles")
         assert tracked["Marker Topic"] == f"/move_base{number}/moving_obstacles"
         assert topics["Local costmap"] == f"/move_base{number}/local_costmap/costmap"
+        assert topics["Particles"] == f"/particlecloud{number}"
+        for method in ("amcl", "slam"):
+            name = f"Estimate of {method}"
+            assert topics[name] == f"/{method}_pose{number}"
+            estimate = next(one for one in group["Displays"] if one["Name"] == name)
+            ellipse = estimate["Covariance"]["Position"]["Color"]
+            assert ellipse == "; ".join(map(str, ROBOT_COLOURS[number]))
         path = next(one for one in group["Displays"] if one["Name"] == "Flown path")
         assert path["Color"] == "; ".join(map(str, ROBOT_COLOURS[number]))
 
@@ -138,7 +145,11 @@ def test_rviz_numbers_the_tools_of_few_quadcopters():
         tools = document(robots, random_mission(robots, 0).scene)["Visualization Manager"]["Tools"]
         return {one["Class"]: one.get("Topic") for one in tools if one["Class"].startswith("quad/")}
 
-    fleet = {"quad/GoalFleet": "/move_base_simple/goal", "quad/SelectQuadcopter": "/clicked_point"}
+    fleet = {
+        "quad/GoalFleet": "/move_base_simple/goal",
+        "quad/PoseFleet": "/initialpose",
+        "quad/SelectQuadcopter": "/clicked_point",
+    }
     assert tools(5) == fleet
     assert tools(3) == {
         **fleet,
@@ -152,7 +163,7 @@ def test_rviz_finds_a_class_and_an_icon_for_each_tool():
     plugin = ElementTree.parse(shipped("rviz", "tools.xml"))
     classes = {one.get("name") for one in plugin.iter("class")}
     tools = {f"quad/{kind}{i}" for kind in ("Goal", "Pose", "PointQuad") for i in range(4)}
-    assert classes == tools | {"quad/GoalFleet", "quad/SelectQuadcopter"}
+    assert classes == tools | {"quad/GoalFleet", "quad/PoseFleet", "quad/SelectQuadcopter"}
     icons = Path(__file__).resolve().parents[3] / "icons" / "classes"
     assert {f"quad/{path.stem}" for path in icons.glob("*.svg")} == classes
 

@@ -189,3 +189,12 @@ def test_a_goal_goes_to_the_selected_quadcopter_else_to_the_nearest():
     router.click(0.0, 0.0, places)
     assert "no quadcopter within 1 m" in router.click(1.1, 0.0, places)
     assert router.selected is None
+
+
+def test_a_pose_goes_to_the_selected_quadcopter_else_to_who_does_not_know_its_place():
+    router, places = GoalRouter(), {0: (0.0, 0.0), 2: (4.0, 0.0)}
+    assert router.route_pose(0.0, 0.0, places, 3) == Route(1, "the only one without a place")
+    assert router.route_pose(0.0, 0.0, places, 4) is None  # 1 or 3
+    assert router.route_pose(3.0, 0.0, {**places, 1: (9.0, 9.0)}, 3).robot == 2
+    router.click(4.0, 0.0, places)
+    assert router.route_pose(0.0, 0.0, places, 4) == Route(2, "selected")

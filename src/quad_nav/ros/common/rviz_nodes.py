@@ -1,9 +1,9 @@
 """Nodes beside RViz: `goal_router`, and `fleet_rviz`, which starts RViz for many quadcopters.
 
-`goal_router` is one goal topic for the whole fleet. It sends each goal of `/move_base_simple/goal`
-on to one quadcopter's own topic: the selected one, or the nearest one. A point on `/clicked_point`
-selects the quadcopter there. It subscribes to the transforms only while it looks for positions,
-because those of a fleet are many.
+`goal_router` is one topic of goals and one of poses for the whole fleet. It sends each message of
+`/move_base_simple/goal` and `/initialpose` on to one quadcopter's own topic: the selected one, or
+the nearest one. A point on `/clicked_point` selects the quadcopter there. It subscribes to the
+transforms only while it looks for positions, because those of a fleet are many.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import Dict, Optional, Tuple
+from typing import Any, Dict, Optional, Sequence, Tuple
 
 import numpy as np
 import rospkg
 import rospy
 import yaml
-from geometry_msgs.msg import PointStamped, PoseStamped
+from geometry_msgs.msg import PointStamped, PoseStamped, PoseWithCovarianceStamped
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.errors import InputError, printable
@@ -30,7 +30,7 @@ from quad_nav.ros.common.marker_messages import replacing_markers
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.scenario.scenario import scene_of
-from quad_nav.topics.goal_routing import GoalRouter, selection_markers
+from quad_nav.topics.goal_routing import GoalRouter, Route, selection_markers
 from quad_nav.topics.rviz_file import EXIT_BAD_INPUT, arguments, document
 from quad_nav.topics.validation import MAX_MAGNITUDE
 
@@ -50,9 +50,16 @@ class GoalRouterNode:
             rospy.Publisher(f"/move_base_simple/goal{i}", PoseStamped, queue_size=1)
             for i in range(robots)
         ]
+        self._poses = [
+            rospy.Publisher(f"/initialpose{i}", PoseWithCovarianceStamped, queue_size=1)
+            for i in range(robots)
+        ]
         self._selection = rospy.Publisher("~selection", MarkerArray, queue_size=1, latch=True)
         self._subscribers = [
             rospy.Subscriber("/move_base_simple/goal", PoseStamped, self._on_goal, queue_size=1),
+            rospy.Subscriber(
+                "/initialpose", PoseWithCovarianceStamped, self._on_pose, queue_size=1
+            ),
             rospy.Subscriber("/clicked_point", PointStamped, self._on_click, queue_size=1),
         ]
 
@@ -70,18 +77,45 @@ class GoalRouterNode:
                     " base_link{i}"
                 )
                 return
-            goals = self._goals[route.robot]
-            if not goals.get_num_connections():
+            self._pass_on("goal", "navigator", message, place, route, self._goals)
+
+    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        with self._lock:
+            point = message.pose.pose.position
+            located = self._locate("pose", message.header.frame_id, point.x, point.y)
+            if located is None:
+                return
+            place, positions = located
+            route = self._router.route_pose(*place, positions, len(self._poses))
+            if route is None:
                 rospy.logerr(
-                    "quad%d: goal (%.2f, %.2f) m dropped: no node subscribes to %s, expected its"
-                    " navigator",
-                    route.robot,
-                    *place,
-                    goals.resolved_name,
+                    "goal_router: pose dropped: several quadcopters have no transform from map to"
+                    " base_link{i}; publish it on /initialpose{i}"
                 )
                 return
-            rospy.loginfo("quad%d: goal (%.2f, %.2f) m: %s", route.robot, *place, route.reason)
-            goals.publish(message)
+            self._pass_on("pose", "localization", message, place, route, self._poses)
+
+    def _pass_on(
+        self,
+        kind: str,
+        receiver: str,
+        message: Any,
+        place: Tuple[float, float],
+        route: Route,
+        topics: Sequence[rospy.Publisher],
+    ) -> None:
+        topic = topics[route.robot]
+        told = f"quad{route.robot}: {kind} ({place[0]:.2f}, {place[1]:.2f}) m"
+        if not topic.get_num_connections():
+            rospy.logerr(
+                "%s dropped: no node subscribes to %s, expected its %s",
+                told,
+                topic.resolved_name,
+                receiver,
+            )
+            return
+        rospy.loginfo("%s: %s", told, route.reason)
+        topic.publish(message)
 
     def _on_click(self, message: PointStamped) -> None:
         with self._lock:

@@ -22,6 +22,7 @@ from quad_nav.mission.progress import SequenceProgress
 from quad_nav.mission.sequencer import NavigatorReport, Sequencer, Verdict
 from quad_nav.ros.sequencer.mission_journal import MissionJournal
 from quad_nav.ros.sequencer.odometry import Track
+from quad_nav.ros.sequencer.truth import TruthTopic
 from quad_nav.sim.contacts import Contact
 
 
@@ -32,6 +33,7 @@ class FlightRecord:
         log: Flight log; hold `lock` to use it.
         lock: Lock of the log.
         journal: Journal of the mission.
+        truth: Errors of the poses, where somebody knows the true ones.
     """
 
     def __init__(self, new_log: Callable[[], FlightLog], journal: MissionJournal) -> None:
@@ -45,12 +47,14 @@ class FlightRecord:
         self.log = new_log()
         self.lock = threading.Lock()
         self.journal = journal
+        self.truth = TruthTopic()
 
     def begin(self, now_s: float) -> None:
         """Start with an empty log and journal."""
         with self.lock:  # what others add now comes after both
             self.log = self._new_log()
             self.journal.begin(now_s)
+            self.truth.forget()
         self.journal.wait()
 
     def add_flight(
@@ -63,6 +67,7 @@ class FlightRecord:
         """Add the poses of a robot, what its navigator reports and the number of recoveries."""
         aborts = sum(report.verdict is Verdict.ABORTED for report in reports)
         with self.lock:
+            self.truth.compare(list(self.log.robots).index(name), track)
             log = self.log.robots[name]
             log.recoveries += recoveries
             log.aborts += aborts

@@ -291,7 +291,7 @@ class MissionRunner:
                 seed=self._seed,
                 contacts_reported=self._setup.simulation or self._hears_contacts,
             )
-        return replace(summary, facts=self._setup.facts)
+            return replace(summary, facts={**self._setup.facts, **record.truth.facts})
 
     def _begin(self, now_s: float) -> None:
         self._now_s = self._begun_s = now_s

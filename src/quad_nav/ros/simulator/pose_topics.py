@@ -26,6 +26,7 @@ from quad_nav.ros.navigator.costmap_publisher import NewSubscriber, Publish
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.odometry import pose_in
 from quad_nav.sim.simulation import Simulation
+from quad_nav.topics.estimates import TRUTH_TOPIC
 
 
 class PoseTopics:
@@ -34,8 +35,8 @@ class PoseTopics:
     def __init__(self, simulation: Simulation, localizes: bool) -> None:
         """Advertise the topics, and lay out their messages.
 
-        Without ``localizes`` somebody else publishes `map -> odom{i}`, and no message tells where
-        a quadcopter is in `map`.
+        Without ``localizes`` somebody else publishes `map -> odom{i}`, and only `/quad/truth` tells
+        where a quadcopter is in `map`.
         """
         self._simulation = simulation
         self._first = 0 if localizes else 1  # of a quadcopter's transforms
@@ -55,16 +56,18 @@ class PoseTopics:
         self._last: Optional[rospy.AnyMsg] = None
         self._tf = rospy.Publisher("/tf", TFMessage, NewSubscriber(self._send_last), queue_size=10)
         self._odometry = [rospy.Publisher(f"/odom{i}", Odometry, queue_size=10) for i in robots]
-        self._states = rospy.Publisher(STATES_TOPIC, StatesMessage, queue_size=10)
+        topic = STATES_TOPIC if localizes else TRUTH_TOPIC
+        self._states = rospy.Publisher(topic, StatesMessage, queue_size=10)
         self._in_bulk = self._robots_in_bulk()
 
     def _robots_in_bulk(self) -> NDArray[np.int64]:
         """Return the robots whose states are published in one message.
 
-        If odometry or tf is remapped, or somebody else localizes, another node publishes what the
-        others hear of a robot.
+        If odometry or tf is remapped, another node publishes what the others hear of a robot.
         """
-        if self._first or self._tf.resolved_name != "/tf":
+        if self._first:
+            return np.arange(self._simulation.n_robots)
+        if self._tf.resolved_name != "/tf":
             return np.zeros(0, np.int64)
         names = [publisher.resolved_name for publisher in self._odometry]
         return np.flatnonzero([name == f"/odom{i}" for i, name in enumerate(names)])
