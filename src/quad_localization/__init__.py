@@ -2,7 +2,8 @@
 
 Reading order of amcl: ``localizer`` (the node without ROS), ``particle_filter`` with ``clusters``
 and ``covariance_axes``; ``odometry_models``; ``laser`` with ``scan_beams`` and ``occupancy_map``;
-``parameters``. Of slam: ``slam`` and ``growing_map``. ``map_files`` reads and saves maps.
+``place_search``; ``parameters``. Of slam: ``slam`` and ``growing_map``. ``map_files`` reads and
+saves maps.
 """
 
 from __future__ import annotations

@@ -36,32 +36,24 @@ class Laser:
         self,
         params: AmclParams,
         grid: OccupancyMap,
-        distances_m: Optional[Floats],
+        distances_m: Floats,
         mount: Tuple[float, float],
     ) -> None:
-        """Take a map and the laser's place in the base, in metres.
-
-        ``distances_m`` are those of the map's cells to obstacles; ``beam`` needs none.
-        """
+        """Take a map, its cells' distances to obstacles, and the laser's place in the base."""
         self.is_due = True
         self._params, self._grid, self._mount = params, grid, mount
         self._old = np.zeros((0, 0))  # upstream's table of likelihoods for beam skipping
-        if distances_m is not None:
-            # The last values are those outside the map.
-            z = np.append(distances_m, params.laser_likelihood_max_dist_m)
-            self._distances_m = np.append(distances_m, math.inf)
-            self._hits = params.laser_z_hit * _density(z, params.laser_sigma_hit_m)
+        # The last values are those outside the map.
+        z = np.append(distances_m, params.laser_likelihood_max_dist_m)
+        self._distances_m = np.append(distances_m, math.inf)
+        self._hits = params.laser_z_hit * _density(z, params.laser_sigma_hit_m)
 
     def factors(self, poses: Floats, is_converged: bool, beams: Beams) -> Optional[Floats]:
         """Return the factors float64[m] of poses float64[m, 3]; None without beams in use."""
-        params, count = self._params, len(beams.ranges_m)
+        params = self._params
         if params.laser_max_beams < 2:
             return None
-        if params.laser_model_type == LIKELIHOOD_FIELD_PROB:
-            step = math.ceil(count / params.laser_max_beams)
-        else:
-            step = (count - 1) // (params.laser_max_beams - 1)
-        used = slice(None, None, max(step, 1))  # upstream never ends if this is 0
+        used = self._used(beams)
         ranges_m, bearings_rad = beams.ranges_m[used], beams.bearings_rad[used]
         is_used = ranges_m < beams.range_max_m  # false for NaN
         if params.laser_model_type == BEAM:
@@ -82,6 +74,24 @@ class Laser:
             likelihoods = self._without_skipped(likelihoods, agrees, np.flatnonzero(is_used))
         with np.errstate(divide="ignore"):
             return np.exp(np.log(likelihoods).sum(axis=1))
+
+    def ends(self, beams: Beams) -> Floats:
+        """Return the ends float64[n, 2] of the beams in use that return, in the base frame."""
+        used = self._used(beams)
+        ranges_m, bearings_rad = beams.ranges_m[used], beams.bearings_rad[used]
+        directions = np.column_stack((np.cos(bearings_rad), np.sin(bearings_rad)))
+        returns = ranges_m < beams.range_max_m  # false for NaN
+        ends: Floats = self._mount + ranges_m[returns, None] * directions[returns]
+        return ends
+
+    def _used(self, beams: Beams) -> slice:
+        """Return which beams are in use."""
+        count, most = len(beams.ranges_m), self._params.laser_max_beams
+        if self._params.laser_model_type == LIKELIHOOD_FIELD_PROB:
+            step = math.ceil(count / max(most, 1))
+        else:
+            step = (count - 1) // max(most - 1, 1)
+        return slice(None, None, max(step, 1))  # upstream never ends if this is 0
 
     def _of_ranges(self, ranges_m: Floats, expected_m: Floats, largest_m: float) -> Floats:
         """Return the likelihoods float64[m, n] of ranges float64[n] where others are expected."""

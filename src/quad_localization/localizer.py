@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Dict, Optional
 
 import numpy as np
@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from quad_localization.laser import Laser
 from quad_localization.occupancy_map import OccupancyMap, obstacle_distances
 from quad_localization.odometry_models import angle_difference, moved
-from quad_localization.parameters import BEAM, AmclParams
+from quad_localization.parameters import AmclParams
 from quad_localization.particle_filter import ParticleFilter
+from quad_localization.place_search import PlaceSearch
 from quad_localization.random_numbers import seeded
 from quad_localization.scan_beams import Beams, beams_of, levelled, tilted_yaw
 from quad_nav.geometry import Pose2D, Pose3D, Scan
@@ -24,6 +25,8 @@ Floats = NDArray[np.float64]
 
 _SURE = 0.5
 """Weight of a cluster below which another place is as likely."""
+_FOUND = np.diag((0.05**2, 0.05**2, 0.02**2))
+"""Covariance of a pose that a search has found, in m and rad."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,6 @@ class Update:
         is_resampled: Whether they were resampled.
         estimate: A new estimate; None between.
         shows_cloud: Whether the particles are to be published.
-        map_from_odom: The latest transform; None before the first estimate.
     """
 
     is_moved: bool = False
@@ -71,7 +73,6 @@ class Update:
     is_resampled: bool = False
     estimate: Optional[PoseEstimate] = None
     shows_cloud: bool = False
-    map_from_odom: Optional[Pose3D] = None
 
 
 class Amcl:
@@ -82,6 +83,8 @@ class Amcl:
         particles: The particle filter, None before the first map.
         estimate: Latest estimate, None before the first.
         map_from_odom: Latest transform.
+        fit: Share of the last scan's beams that end near an obstacle of the map; None without any.
+        search: The search for the place of a lost robot, None before the first map.
         is_update_requested: Whether the next scan updates without motion.
         update_count: Updates since the last initialisation.
     """
@@ -92,11 +95,13 @@ class Amcl:
         self.particles: Optional[ParticleFilter] = None
         self.estimate: Optional[PoseEstimate] = None
         self.map_from_odom: Optional[Pose3D] = None
+        self.fit: Optional[float] = None
+        self.search: Optional[PlaceSearch] = None
         self.is_update_requested = False
         self.update_count = 0
         self._random, self._spreads = seeded(seed), 0
         self._grid: Optional[OccupancyMap] = None
-        self._distances_m: Optional[Floats] = None
+        self._distances_m: Floats
         self._lasers: Dict[str, Laser] = {}
         self._given: Optional[PoseEstimate] = None  # before the map
         self._has_begun = False  # since the last initialisation
@@ -104,10 +109,17 @@ class Amcl:
 
     @property
     def is_lost(self) -> bool:
-        """The robot does not know its place, so that it has to hover until scans tell it.
+        """The robot does not know its place, so that it has to hover until scans tell it."""
+        return self.is_searching or self._is_spread
 
-        The heaviest cluster decides: random particles of the recovery spread all of them.
-        """
+    @property
+    def is_searching(self) -> bool:
+        """Scans do not fit the estimate, so that the whole map is searched."""
+        return self.search is not None and self.search.is_on
+
+    @property
+    def _is_spread(self) -> bool:
+        """The heaviest cluster is light or wide: random particles of the recovery spread all."""
         limit_m = self.params.lost_above_m
         if self.particles is None or limit_m == 0.0 or self.params.upstream:
             return False
@@ -142,6 +154,8 @@ class Amcl:
             return False
         self.particles.spread_uniformly()
         self._has_begun = False
+        if self.search is not None and self._is_judged:
+            self.search.begin()
         return True
 
     def seed(self, seed: int) -> None:
@@ -165,10 +179,12 @@ class Amcl:
 
     def _make_sensors(self, grid: OccupancyMap) -> None:
         """Measure a map, and forget the lasers."""
-        self._grid, self._lasers, self._distances_m = grid, {}, None
-        if self.params.laser_model_type != BEAM:
-            largest_m = self.params.laser_likelihood_max_dist_m
-            self._distances_m = obstacle_distances(grid, largest_m)
+        self._grid, self._lasers = grid, {}
+        self._distances_m = obstacle_distances(grid, self.params.laser_likelihood_max_dist_m)
+        was_searching = self.is_searching
+        self.search = PlaceSearch(grid, self._distances_m, self._random)
+        if was_searching:
+            self.search.begin()
 
     def _spread(self, about: PoseEstimate) -> None:
         assert self.particles is not None
@@ -178,6 +194,8 @@ class Amcl:
         mean = np.array((about.pose.x_m, about.pose.y_m, about.pose.yaw_rad))
         self.particles.spread_normally(mean, about.covariance)
         self._has_begun = False
+        if self.search is not None:
+            self.search.is_on = False
 
     def update(self, seen: Observation) -> Optional[Update]:
         """Take a scan; return None if nothing was done with it."""
@@ -193,28 +211,86 @@ class Amcl:
         if seen.laser not in self._lasers:  # whose mount stays that of its first scan
             place = (float(mount.x_m), float(mount.y_m))
             self._lasers[seen.laser] = Laser(params, grid, self._distances_m, place)
-        laser, begins = self._lasers[seen.laser], not self._has_begun
-        odometry = Pose2D(at.x_m, at.y_m, tilted_yaw(at.quaternion))
+        laser, odometry = (
+            self._lasers[seen.laser],
+            Pose2D(at.x_m, at.y_m, tilted_yaw(at.quaternion)),
+        )
+        if beams is not None:
+            self._leave_out_peers(beams, seen)
+        update: Optional[Update] = Update()
+        if not self.is_searching:
+            update = self._filter(particles, laser, beams, odometry, at)
+        if beams is None or update is None or not self._is_judged:
+            return update
+        found = self._judge(particles, laser.ends(beams), odometry, at)
+        return update if found is None else replace(update, estimate=found)
+
+    def _filter(
+        self,
+        particles: ParticleFilter,
+        laser: Laser,
+        beams: Optional[Beams],
+        odometry: Pose2D,
+        odom_from_base: Pose3D,
+    ) -> Optional[Update]:
+        """Move, weigh and resample the particles, if that is due."""
+        begins, params = not self._has_begun, self.params
         if begins:
             self._odometry, self._has_begun, self.update_count = odometry, True, 0
         if begins or self._is_update_due(odometry):
             for one in self._lasers.values():
                 one.is_due = True
         if not laser.is_due:
-            return Update(map_from_odom=self.map_from_odom)
+            return Update()
         if not begins:
             self._move(particles, odometry)
         if beams is None:  # upstream has moved the particles, and will move them again
             return None
-        is_weighed = self._weigh(particles, laser, beams, seen)
+        laser.is_due = False
+        factors = laser.factors(particles.poses, particles.is_converged, beams)
+        if factors is not None:
+            particles.weigh(factors)
         self._odometry = odometry
         self.update_count += 1
         is_resampled = self.update_count % max(params.resample_interval, 1) == 0
         if is_resampled:
             particles.resample()
-        estimate = self._estimate(particles, at) if is_resampled or begins else None
-        shows_cloud, transform = not self.is_update_requested, self.map_from_odom
-        return Update(not begins, is_weighed, is_resampled, estimate, shows_cloud, transform)
+        estimate = self._estimate(particles, odom_from_base) if is_resampled or begins else None
+        shows_cloud = not self.is_update_requested
+        return Update(not begins, factors is not None, is_resampled, estimate, shows_cloud)
+
+    @property
+    def _is_judged(self) -> bool:
+        return self.params.lost_below > 0.0 and not self.params.upstream
+
+    def _judge(
+        self, particles: ParticleFilter, points: Floats, odometry: Pose2D, odom_from_base: Pose3D
+    ) -> Optional[PoseEstimate]:
+        """Compare the ends of beams with the map; search while they do not fit.
+
+        While a search goes on, the particles wait at the last estimate, which may be right.
+
+        Returns:
+            The estimate, if the search has found the place.
+        """
+        search = self.search
+        if search is None or not len(points):
+            self.fit = None
+            return None
+        if self._has_begun and self.map_from_odom is not None:
+            here = self.map_from_odom.compose(odom_from_base).to_2d()
+            self.fit = search.fit(here, points)
+            if self.fit >= self.params.lost_below or self._is_spread:
+                search.is_on = False
+            elif not search.is_on:
+                search.begin()
+        if not search.is_on:
+            return None
+        place = search.add_scan(points, odometry)
+        if place is None or search.fit(place, points) < self.params.lost_below:
+            return None
+        self._spread(PoseEstimate(place, _FOUND))
+        return self._estimate(particles, odom_from_base)
 
     def _is_update_due(self, odometry: Pose2D) -> bool:
         """Tell whether the robot has moved enough, or an update was requested."""
@@ -234,18 +310,6 @@ class Amcl:
         delta = (odometry.x_m - before.x_m, odometry.y_m - before.y_m, turn_rad)
         old_yaw_rad = odometry.yaw_rad - turn_rad
         particles.poses = moved(self.params, particles.poses, old_yaw_rad, delta, self._random)
-
-    def _weigh(
-        self, particles: ParticleFilter, laser: Laser, beams: Beams, seen: Observation
-    ) -> bool:
-        """Weigh the particles by a scan; return false if no beam is in use."""
-        self._leave_out_peers(beams, seen)
-        factors = laser.factors(particles.poses, particles.is_converged, beams)
-        laser.is_due = False
-        if factors is None:
-            return False
-        particles.weigh(factors)
-        return True
 
     def _leave_out_peers(self, beams: Beams, seen: Observation) -> None:
         """Take the ranges of beams that end on peers out; the latest transform says where."""

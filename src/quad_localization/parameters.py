@@ -116,6 +116,9 @@ class AmclParams:
     lost_above_m: float = fixed_number(
         "lost_above", 0.5, "m", "Deviation above which no transform is sent.", own=True
     )
+    lost_below: float = fixed_number(
+        "lost_below", 0.5, "", "Fit below which no transform is sent; 0: none.", own=True
+    )
     upstream: bool = fixed_flag("upstream", False, "Behave as C++ amcl, bugs included.", own=True)
 
 

@@ -66,7 +66,7 @@ class ParticleFilter:
     def spread_uniformly(self) -> None:
         """Draw particles all over the free cells."""
         poses = np.empty((max(self.params.max_particles, 1), 3))
-        _draw_poses(poses, self.free_places, self._state)
+        draw_poses(poses, self.free_places, self._state)
         self._begin(poses)
 
     def _begin(self, poses: Floats) -> None:
@@ -131,7 +131,7 @@ def are_near(poses: Floats, distance_m: float) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _draw_poses(poses: Floats, places: Floats, state: State) -> None:
+def draw_poses(poses: Floats, places: Floats, state: State) -> None:
     """Draw poses float64[m, 3] in the centres of free cells."""
     for m in range(len(poses)):
         place = places[int(uniform(state) * len(places))]
@@ -183,7 +183,7 @@ def _draw_by_weight(
     drawn = np.empty((most, 3))
     for count in range(1, most + 1):
         if uniform(state) < random_share:
-            _draw_poses(drawn[count - 1 : count], places, state)
+            draw_poses(drawn[count - 1 : count], places, state)
         else:
             chosen = np.searchsorted(sums, uniform(state), side="right")
             drawn[count - 1] = poses[min(chosen, len(poses) - 1)]  # rounding: the sum is below 1

@@ -26,31 +26,32 @@ QUICK = AmclParams(
 START = Pose2D(1.5, 2.0, 0.3)
 
 
-def room():
+def room(boxes):
     cells = np.zeros((81, 121), np.int8)
     cells[0], cells[-1], cells[:, 0], cells[:, -1] = 100, 100, 100, 100
-    cells[60:80, 20:30] = cells[10:16, 80:100] = 100
+    for rows, columns in boxes:
+        cells[rows, columns] = 100
     return OccupancyMap.from_occupancy(cells, 0.05, 0.0, 0.0)
 
 
-ROOM = room()
+ROOM = room([(slice(60, 80), slice(20, 30)), (slice(10, 16), slice(80, 100))])
 
 
 def estimate(pose=START, variance=0.01):
     return PoseEstimate(pose, variance * np.eye(3))
 
 
-def localizer(params=QUICK, seed=1, pose=START, variance=0.01):
+def localizer(params=QUICK, seed=1, pose=START, variance=0.01, grid=ROOM):
     amcl = Amcl(params, seed)
-    amcl.set_map(ROOM, estimate(pose, variance))
+    amcl.set_map(grid, estimate(pose, variance))
     return amcl
 
 
-def scan_from(pose, hidden=(), range_max_m=60.0):
+def scan_from(pose, hidden=(), range_max_m=60.0, grid=ROOM):
     """Return the scan at a pose; beams in ``hidden`` have the range given there."""
     x_m, y_m = pose.transform(MOUNT.x_m, MOUNT.y_m)
     ranges_m = [
-        ray_range(ROOM.states, ROOM.frame, x_m, y_m, pose.yaw_rad - math.pi + k * STEP_RAD, 60.0)
+        ray_range(grid.states, grid.frame, x_m, y_m, pose.yaw_rad - math.pi + k * STEP_RAD, 60.0)
         for k in range(BEAMS)
     ]
     for k, range_m in dict(hidden).items():
@@ -86,8 +87,8 @@ def test_finds_where_it_is(model):
 
 def test_the_transform_takes_odometry_to_the_map():
     amcl = localizer(variance=0.0)
-    update = amcl.update(seen(START, Pose2D(0.2, -0.1, 1.0)))
-    found = update.map_from_odom.compose(Pose2D(0.2, -0.1, 1.0).to_3d()).to_2d()
+    amcl.update(seen(START, Pose2D(0.2, -0.1, 1.0)))
+    found = amcl.map_from_odom.compose(Pose2D(0.2, -0.1, 1.0).to_3d()).to_2d()
     assert found.distance_to(START) < 1e-9
     assert found.yaw_rad == pytest.approx(0.3)
 
@@ -194,8 +195,75 @@ def test_the_transform_of_a_flying_robot_keeps_its_height_and_tilt():
     amcl.set_map(ROOM, PoseEstimate(Pose2D(1.0, 1.0), 1e-6 * np.eye(3)))
     tilted = Pose3D(0.5, 0.2, 1.2, quaternion_from_euler(0.1, 0.05, 0.3))
     scan = Scan(0.0, -math.pi, math.pi / 8, 0.02, 60.0, np.full(16, 1.0, np.float32))
-    update = amcl.update(Observation("lidar", scan, Pose3D(0.0, 0.0, 0.06), tilted))
-    found = update.map_from_odom.compose(tilted)
+    amcl.update(Observation("lidar", scan, Pose3D(0.0, 0.0, 0.06), tilted))
+    found = amcl.map_from_odom.compose(tilted)
     assert found.z_m == pytest.approx(1.2)
     assert found.rotation[2] == pytest.approx(tilted.rotation[2])
     assert (found.x_m, found.y_m) == pytest.approx((1.0, 1.0), abs=0.01)
+
+
+CARRIED = Pose2D(4.5, 2.6, -1.0)
+AT_ZERO = Pose2D(0.0, 0.0)
+ALL_OVER = 60  # scans, of 4,000 random poses each: more than a search of this room needs
+
+
+def carried_away(grid, is_begun):
+    """Return a robot that was carried by 3 m, or that was told a place 3 m off, after one scan."""
+    amcl = localizer(grid=grid)
+    if is_begun:
+        amcl.update(seen(START, AT_ZERO, scan_from(START, grid=grid)))
+        assert not amcl.is_lost
+    amcl.update(seen(CARRIED, AT_ZERO, scan_from(CARRIED, grid=grid)))
+    return amcl
+
+
+@pytest.mark.parametrize("is_begun", [True, False], ids=["kidnapped", "told a wrong place"])
+def test_a_robot_whose_scans_do_not_fit_is_lost_at_once_and_finds_its_place(is_begun):
+    amcl = carried_away(ROOM, is_begun)
+    assert amcl.is_lost and amcl.fit < 0.5
+    for _ in range(ALL_OVER):
+        amcl.update(seen(CARRIED, AT_ZERO))
+    assert not amcl.is_lost and amcl.fit > 0.9
+    assert amcl.estimate.pose.distance_to(CARRIED) < 0.1
+    assert amcl.estimate.pose.yaw_rad == pytest.approx(CARRIED.yaw_rad, abs=0.05)
+
+
+def test_a_search_of_the_whole_map_begins_anywhere():
+    amcl = localizer()
+    amcl.set_uniform()
+    assert amcl.is_lost
+    for k in range(ALL_OVER):  # it drifts meanwhile
+        amcl.update(seen(CARRIED, Pose2D(0.001 * k, 0.0), scan_from(CARRIED)))
+    assert not amcl.is_lost
+    assert amcl.estimate.pose.distance_to(CARRIED) < 0.1
+
+
+def test_where_two_places_look_the_same_a_robot_stays_lost():
+    """A room without boxes looks the same from the opposite place."""
+    empty = room([])
+    amcl = carried_away(empty, True)
+    for _ in range(ALL_OVER):
+        amcl.update(seen(CARRIED, AT_ZERO, scan_from(CARRIED, grid=empty)))
+        assert amcl.is_lost
+    assert amcl.search.is_complete and amcl.search.is_ambiguous
+    turned = Pose2D(6.05 - CARRIED.x_m, 4.05 - CARRIED.y_m, CARRIED.yaw_rad + math.pi)
+    best = [Pose2D(*row) for row in amcl.search.poses[:2].tolist()]
+    assert min(one.distance_to(CARRIED) for one in best) < 0.1
+    assert min(one.distance_to(turned) for one in best) < 0.1
+    amcl.set_pose(estimate(CARRIED))
+    amcl.update(seen(CARRIED, AT_ZERO, scan_from(CARRIED, grid=empty)))
+    assert not amcl.is_lost, "a person told it"
+
+
+@pytest.mark.parametrize("peer", [True, False], ids=["a peer", "a box that is not on the map"])
+def test_what_hides_beams_does_not_make_a_robot_lost(peer):
+    """Ten beams end on a peer, 0.8 m ahead; a box of 1 m, 0.4 m ahead, hides 21."""
+    half, range_m = (5, 0.5) if peer else (10, 0.4)
+    hidden = {k: range_m for k in range(BEAMS // 2 - half, BEAMS // 2 + half + 1)}
+    peers = np.array([START.transform(0.8, 0.0)] if peer else []).reshape(-1, 2)
+    amcl = localizer()
+    amcl.update(seen(START))
+    for _ in range(20):
+        amcl.update(seen(START, scan=scan_from(START, hidden), peers=peers))
+        assert not amcl.is_lost
+    assert amcl.fit == pytest.approx(1.0 if peer else 1.0 - 21 / 72, abs=0.1)

@@ -276,6 +276,7 @@ class AmclRobot:
             self._seen_s, self._odom_from_base = stamp.to_sec(), seen.odom_from_base
             update, params = self._amcl.update(seen), self.params
             is_lost, particles = self._amcl.is_lost, self._amcl.particles
+            transform = self._amcl.map_from_odom
             if particles is None:
                 self._waiting = stamp, seen
                 self._warn("no map yet: no transform until there is one")
@@ -292,12 +293,12 @@ class AmclRobot:
             pose = PoseWithCovariance(pose_message(estimate.pose.to_3d()), covariance)
             header = Header(0, stamp, params.global_frame_id)
             self._pose.publish(PoseWithCovarianceStamped(header, pose))
-        if update.map_from_odom is None:
+        if transform is None:
             return
         if params.tf_broadcast and not is_lost:  # without it the navigator stops
             frames = params.global_frame_id, params.odom_frame_id
             until = stamp + rospy.Duration(params.transform_tolerance_s)
-            self._send(transform_message(update.map_from_odom, *frames, until))
+            self._send(transform_message(transform, *frames, until))
         rate_hz, now_s = params.save_pose_rate_hz, rospy.get_time()
         is_due = rate_hz > 0.0 and now_s - self._saved_s >= 1.0 / rate_hz
         if update.estimate is None and is_due and not self._saver.is_alive():
@@ -324,8 +325,15 @@ class AmclRobot:
         params, estimate = self.params, self._amcl.estimate
         level, message = Level.OK, "OK"
         values = {}
-        if self._amcl.particles is None:
+        search, fit = self._amcl.search, self._amcl.fit
+        if search is None:
             level, message = Level.ERROR, "no map"
+        elif self._amcl.is_lost:
+            level, message = Level.ERROR, "lost"
+            if search.is_on and search.is_complete:
+                message += (
+                    ": other places fit as well" if search.is_ambiguous else ": no place fits"
+                )
         elif self._seen_s is None or rospy.get_time() - self._seen_s > SILENT_S:
             level, message = Level.WARN, "no scans with odometry"
         elif estimate is None:
@@ -340,6 +348,8 @@ class AmclRobot:
             )
             values = {f"std_{name}": f"{value:.4f}" for name, value in zip(names, deviations)}
             values.update({f"std_warn_level_{n}": f"{one:g}" for n, one in zip(names, limits)})
+            if fit is not None:
+                values["fit"] = f"{fit:.2f}"
             if level is Level.OK and any(np.greater(deviations, limits)):
                 level, message = Level.WARN, "Too large"
         return Health(f"{self.name}: Standard deviation", self.name, level, message, values)

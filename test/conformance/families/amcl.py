@@ -20,7 +20,7 @@ from quad_localization.occupancy_map import (
     ray_range,
 )
 from quad_localization.odometry_models import angle_difference, moved
-from quad_localization.parameters import BEAM, AmclParams, read_params
+from quad_localization.parameters import AmclParams, read_params
 from quad_localization.particle_filter import ParticleFilter, are_near, resample_limit
 from quad_localization.random_numbers import State, seeded, uniform
 from quad_localization.scan_beams import beams_of
@@ -79,9 +79,7 @@ def check_sensor(path: Path) -> List[Difference]:
     case, comparison = load_case(path), Comparison()
     arrays, meta = case.arrays, case.meta
     params, grid, mount = upstream_params(meta["params"]), map_of(arrays, meta), meta["laser_pose"]
-    distances_m = None
-    if params.laser_model_type != BEAM:
-        distances_m = obstacle_distances(grid, params.laser_likelihood_max_dist_m)
+    distances_m = obstacle_distances(grid, params.laser_likelihood_max_dist_m)
     laser = Laser(params, grid, distances_m, tuple(mount[:2]))
     particles = ParticleFilter(params, grid.free_places, seeded(0))
     for k, call in enumerate(meta["calls"]):

@@ -10,7 +10,7 @@ import numpy as np
 from families.amcl import TOLERANCE, map_of, pose_of, relative, scan_of, upstream_params
 from families.case import Arrays, Case, load_case
 from families.comparison import Comparison, Difference
-from quad_localization import Amcl, AmclParams, Observation, PoseEstimate, Update
+from quad_localization import Amcl, Observation, PoseEstimate, Update
 from quad_localization.scan_beams import beams_of, tilted_yaw
 from quad_nav.geometry import Pose2D, Pose3D
 
@@ -72,15 +72,16 @@ def _check_scan(
     comparison.near(f"odom[{k}]", planar, arrays["odom"][k], TOLERANCE)
     seen = Observation(str(event["laser"]), scan, mount, odometry)
     update = amcl.update(seen) or _NOTHING
-    _check_update(arrays, comparison, k, params, update)
+    _check_update(arrays, comparison, k, amcl, update)
     return _check_state(arrays, comparison, k, amcl, first)
 
 
 def _check_update(
-    arrays: Arrays, comparison: Comparison, k: int, params: AmclParams, update: Update
+    arrays: Arrays, comparison: Comparison, k: int, amcl: Amcl, update: Update
 ) -> None:
-    sends = params.tf_broadcast and update.map_from_odom is not None
-    for name, found in (
+    found = amcl.map_from_odom if update is not _NOTHING else None
+    sends = amcl.params.tf_broadcast and found is not None
+    for name, happened in (
         ("action", update.is_moved),
         ("updated", update.is_weighed),
         ("resampled", update.is_resampled),
@@ -88,7 +89,7 @@ def _check_update(
         ("cloud_published", update.shows_cloud),
         ("tf_broadcast", sends),
     ):
-        comparison.exact(f"{name}[{k}]", found, arrays[name][k] != 0)
+        comparison.exact(f"{name}[{k}]", happened, arrays[name][k] != 0)
     pose, covariance = np.full(3, np.nan), np.full(36, np.nan)
     if update.estimate is not None:
         estimate = update.estimate
@@ -100,8 +101,8 @@ def _check_update(
     comparison.near(f"pose[{k}]", pose, arrays["pose"][k], TOLERANCE)
     comparison.near(f"covariance[{k}]", covariance, arrays["covariance"][k], TOLERANCE)
     transform = np.full(7, np.nan)
-    if update.map_from_odom is not None:
-        transform = _row(update.map_from_odom)
+    if found is not None:
+        transform = _row(found)
     recorded = arrays["map_to_odom"][k].copy()
     recorded[3:] *= -1.0 if transform[3:] @ recorded[3:] < 0.0 else 1.0
     comparison.near(f"map_to_odom[{k}]", transform, recorded, TOLERANCE)
