@@ -37,7 +37,7 @@ unit38:  ## A part of the unit tests under Python 3.8, where there is one
 
 web: venv  ## The tests of the web page in a real browser: make web TEST=goal
 	@scripts/install_packages --browser
-	@scripts/make_venv .venv requirements-test.txt requirements-web.txt requirements-web-test.txt
+	@scripts/make_venv .venv requirements-test.txt requirements-web.txt requirements-web-test.txt requirements-docs.txt
 	QUAD_CHROMIUM=$$(scripts/chromium) $(PYTHON) -m pytest --timeout 90 test/web $(if $(TEST),-k $(TEST))
 
 lint: venv  ## ruff, mypy, the structure of the sources, and their sizes

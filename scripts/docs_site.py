@@ -19,6 +19,7 @@ from typing import Any, Dict, List
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "src" / "quad_nav"
@@ -29,6 +30,8 @@ PAGES = {
 }
 # [text](target) and ![text](target), the anchor apart; links with a scheme are not ours.
 LINK = re.compile(r"(\]\()(?![a-z]+:)([^)#\s]+)(#[^)\s]*)?(\))")
+# Lists of links within a list of links: the theme makes landmarks of them, many of the same name.
+NESTED_NAV = re.compile(r'(<nav class="md-nav"(?: data-md-level="\d")?) aria-label[^>]*>')
 EXAMPLES = ROOT / "docs" / "python.md"
 EXAMPLE = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
@@ -79,6 +82,12 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
             files.remove(old)
         files.append(File.generated(config, uri, content=text))
     return files
+
+
+def on_post_page(output: str, page: Page, config: MkDocsConfig) -> str:
+    """Name the search for screen readers, and take nested lists of links off their landmarks."""
+    named = output.replace('role="dialog">', 'role="dialog" aria-label="Search">')
+    return NESTED_NAV.sub(r'\1 role="none">', named)
 
 
 class RepositoryPages:
