@@ -21,8 +21,13 @@ from quad_nav.geometry import Pose3D, quaternion_from_yaw  # noqa: E402
 from quad_nav.mission.flight_log import Leg  # noqa: E402
 from quad_nav.mission.goal import Goal  # noqa: E402
 from quad_nav.mission.summary import MissionSummary, RobotSummary, to_json  # noqa: E402
-from quad_nav.ros.common.conversions import pose_array_message, pose_message  # noqa: E402
-from quad_nav.ros.common.packed_messages import STATES_TOPIC, States, states_message  # noqa: E402
+from quad_nav.ros.common.conversions import pose_message  # noqa: E402
+from quad_nav.ros.common.packed_messages import (  # noqa: E402
+    STATES_TOPIC,
+    States,
+    pose_array_message,
+    states_message,
+)
 from quad_nav.sim.motion import Motion, Walkers  # noqa: E402
 from quad_nav.sim.movers import Movers  # noqa: E402
 from quad_nav.sim.obstacles import Box  # noqa: E402
