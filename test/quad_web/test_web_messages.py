@@ -21,10 +21,11 @@ from quad_nav.geometry import Pose3D, quaternion_from_yaw  # noqa: E402
 from quad_nav.mission.flight_log import Leg  # noqa: E402
 from quad_nav.mission.goal import Goal  # noqa: E402
 from quad_nav.mission.summary import MissionSummary, RobotSummary, to_json  # noqa: E402
-from quad_nav.ros.common.conversions import pose_array_message, pose_message  # noqa: E402
+from quad_nav.ros.common.conversions import pose_message  # noqa: E402
 from quad_nav.ros.common.packed_messages import (  # noqa: E402
     STATES_TOPIC,
     States,
+    pose_array_message,
     pose_row,
     states_message,
 )

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Fly the tutorial's mission with stand-ins and the bridge, on a virtual clock.
 
-    PYTHONPATH=src:test python3 test/vehicles/missions.py [FLIGHTS] [AUTOPILOT ...] [amcl]
+    PYTHONPATH=src:test python3 test/vehicles/missions.py [FLIGHTS] [AUTOPILOT ...] [amcl | slam]
 
 The navigators and the sequencers are those of offline flights. Their commands go through the
 bridge, as MAVLink's messages or a Crazyflie's set-points, to two stand-ins, from take-off to
@@ -9,11 +9,11 @@ landing. Navigators and LIDARs see the bridge's estimate; contacts are those of 
 flight is compared with one of the simulator with the same seed, start poses and limits of speed,
 with the airframe `arducopter` and with the default one.
 
-With `amcl` the estimates drift as recorded, LIDARs are on the bodies, and navigators see what amcl
-says, on the map of the arena. A goal counts where the body is.
+With `amcl` or `slam` the estimates drift as recorded, LIDARs are on the bodies, and navigators see
+what it says: amcl on the map of the arena, slam without a map. A goal counts where the body is.
 
 Exit status: 0 if all flights reach all goals without a contact, hold the altitude within 0.10 m,
-and, without amcl, take at most 10 % longer than the simulator's.
+and, without a localization, take at most 10 % longer than the simulator's.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from quad_nav.sim.simulation import Simulation
 from quad_nav.sim.simulation_params import STEP_S
 from quad_nav.topics.vehicle_states import State
 from quad_vehicles.telemetry import Limits
-from quad_vehicles.vehicle_file import AMCL, FIXED, Vehicle
+from quad_vehicles.vehicle_file import FIXED, Vehicle
 
 TICK_STEPS = 6  # 25 ms, as in the node
 TIME_LIMIT_S, GROUND_LIMIT_S = 400.0, 60.0
@@ -214,6 +214,9 @@ class VehicleFlight(Flight):
         loop.simulation = VehicleSimulation(
             self.setup.scene, len(self.setup.robots), params, seed
         ).fly_with(self._autopilot, seed, self._localization)
+        if self._localization == "slam":
+            frames = [bridge.true_frame for bridge in loop.simulation.bridges]
+            loop.group.localization.slam.frames.update(enumerate(frames))
         return loop
 
     def advance(self):
@@ -283,9 +286,9 @@ def fly_simulated(seed, airframe, jitter_m):
 
 def main():
     flights = int(sys.argv[1]) if len(sys.argv) > 1 else 10
-    localization = AMCL if AMCL in sys.argv else FIXED
-    jitter_m = 0.0 if localization == AMCL else JITTER_M  # amcl begins where the file says
-    every = STAND_INS if localization == AMCL else BARE_AIRFRAMES
+    localization = next((one for one in MAKERS if one in sys.argv), FIXED)
+    jitter_m = JITTER_M if localization == FIXED else 0.0  # others begin where the file says
+    every = BARE_AIRFRAMES if localization == FIXED else STAND_INS
     autopilots = [one for one in every if one in sys.argv] or list(every)
     failed = 0
     for autopilot in autopilots:

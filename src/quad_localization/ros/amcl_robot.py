@@ -33,11 +33,11 @@ from quad_nav.errors import excerpt
 from quad_nav.geometry import Pose2D, Pose3D, covariance_36
 from quad_nav.parameter import parameters_of
 from quad_nav.ros.common.conversions import (
-    pose_array_message,
     pose_message,
     transform_message,
 )
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
+from quad_nav.ros.common.packed_messages import pose_array_message
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.ros.navigator.reconfigure import ParameterServer, config_type
 from quad_nav.ros.navigator.robot_identity import number_in
@@ -284,9 +284,8 @@ class AmclRobot:
                 return
             poses = particles.poses.copy() if update.shows_cloud else None
         if poses is not None:
-            cloud = pose_array_message(poses, rospy.get_time())
-            cloud.header.frame_id = params.global_frame_id
-            self._cloud.publish(cloud)
+            frame = params.global_frame_id
+            self._cloud.publish(pose_array_message(poses, rospy.get_time(), frame))
         if update.estimate is not None:
             estimate = update.estimate
             covariance = covariance_36(estimate.covariance).tolist()

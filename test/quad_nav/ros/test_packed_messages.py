@@ -9,7 +9,7 @@ import pytest
 
 rospy = pytest.importorskip("rospy")
 
-from geometry_msgs.msg import Twist, Vector3  # noqa: E402
+from geometry_msgs.msg import PoseArray, Twist, Vector3  # noqa: E402
 from nav_msgs.msg import Odometry, Path  # noqa: E402
 from sensor_msgs.msg import MultiDOFJointState  # noqa: E402
 from tf2_msgs.msg import TFMessage  # noqa: E402
@@ -26,6 +26,7 @@ from quad_nav.ros.common.packed_messages import (  # noqa: E402
     TransformReader,
     TransformsMessage,
     TransformWriter,
+    pose_array_message,
     states_message,
 )
 from quad_nav.topics.validation import pose_problem, twist_problem, valid_states  # noqa: E402
@@ -159,6 +160,16 @@ def test_odometry_is_that_of_rospy():
         )
         expected.header.seq = seq
         assert serialised(writer.message(STAMP, poses[0], twists[0])) == serialised(expected)
+
+
+@pytest.mark.parametrize("count", [0, 1, 30])
+def test_an_array_of_poses_is_read_by_rospy(count):
+    poses = np.random.default_rng(1).normal(size=(count, 3))
+    found = PoseArray().deserialize(serialised(pose_array_message(poses, 2.5, "hall")))
+    assert (found.header.frame_id, found.header.stamp.to_sec()) == ("hall", 2.5)
+    read = [conversions.pose_from_message(one).to_2d() for one in found.poses]
+    rows_read = [(one.x_m, one.y_m, one.yaw_rad) for one in read]
+    assert np.array(rows_read).reshape(-1, 3) == pytest.approx(poses)
 
 
 @pytest.mark.parametrize("count", [0, 1, 30])

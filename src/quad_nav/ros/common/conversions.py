@@ -11,7 +11,6 @@ from diagnostic_msgs.msg import KeyValue
 from geometry_msgs.msg import (
     Point,
     Pose,
-    PoseArray,
     PoseWithCovariance,
     Quaternion,
     Transform,
@@ -25,7 +24,7 @@ from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 
-from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
+from quad_nav.geometry import Pose3D, Scan, Twist2D
 
 _NO_COVARIANCE = [0.0] * 36
 _NO_INTENSITIES = np.empty(0, dtype=np.float32)
@@ -88,12 +87,6 @@ def pose_from_transform(message: TransformStamped) -> Pose3D:
     """Return the pose `parent_from_child`."""
     t, q = message.transform.translation, message.transform.rotation
     return Pose3D(t.x, t.y, t.z, (q.x, q.y, q.z, q.w))
-
-
-def pose_array_message(poses: np.ndarray, now_s: float) -> PoseArray:
-    """Convert poses (x_m, y_m, yaw_rad) in `map`, float64[n, 3]."""
-    upright = [pose_message(Pose2D(*row).to_3d()) for row in poses.tolist()]
-    return PoseArray(Header(0, time_message(now_s), "map"), upright)
 
 
 def odometry_message(

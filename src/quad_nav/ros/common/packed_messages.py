@@ -15,7 +15,7 @@ from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
 import genpy
 import numpy as np
 import rospy
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import PoseArray, TransformStamped
 from nav_msgs.msg import Odometry, Path
 from numpy.typing import NDArray
 from sensor_msgs.msg import MultiDOFJointState
@@ -238,6 +238,15 @@ class TransformWriter:
         rows = np.ascontiguousarray(poses, "<f8")
         data[self._poses] = rows.view(np.uint8).reshape(len(rows), 8 * _POSE)
         return serialised(data.tobytes())
+
+
+def pose_array_message(poses: Floats, now_s: float, frame: str = "map") -> rospy.AnyMsg:
+    """Return a `PoseArray` with poses (x_m, y_m, yaw_rad) in a frame, float64[n, 3]."""
+    rows = np.zeros((len(poses), _POSE), "<f8")
+    rows[:, :2] = poses[:, :2]
+    rows[:, 5], rows[:, 6] = np.sin(0.5 * poses[:, 2]), np.cos(0.5 * poses[:, 2])
+    empty = _bytes(PoseArray(Header(0, time_message(now_s), frame), []))
+    return serialised(empty[: -_COUNT.size] + _COUNT.pack(len(rows)) + rows.tobytes())
 
 
 class OdometryWriter:

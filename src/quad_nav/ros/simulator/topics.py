@@ -18,7 +18,6 @@ from visualization_msgs.msg import MarkerArray
 from quad_nav.ros.common.conversions import (
     ScanMessage,
     key_values,
-    pose_array_message,
     scan_message,
     time_message,
 )
@@ -26,6 +25,7 @@ from quad_nav.ros.common.diagnostics import DiagnosticsTopic
 from quad_nav.ros.common.marker_messages import marker_array
 from quad_nav.ros.common.nav_messages import map_message
 from quad_nav.ros.common.own_messages import contact_message, flight_info_message
+from quad_nav.ros.common.packed_messages import pose_array_message
 from quad_nav.ros.simulator.pose_topics import PoseTopics
 from quad_nav.scenario.scene_map import scene_map
 from quad_nav.sim.contacts import Contact
