@@ -151,8 +151,7 @@ def _reach(errors: Optional[Json]) -> Optional[Tuple[Sequence[float], Sequence[f
 def _scatter(axes: Axes, trace: Json) -> None:
     x, y, marker, line = trace["x"], _known(trace["y"]), trace.get("marker"), trace.get("line", {})
     name, reach = trace.get("name", ""), _reach(trace.get("error_y"))
-    if "fill" in trace:
-        _fill(axes, trace)
+    _fill(axes, trace)
     if "lines" in trace["mode"]:
         axes.plot(
             _known(x),
@@ -192,7 +191,9 @@ def _scatter(axes: Axes, trace: Json) -> None:
 
 
 def _fill(axes: Axes, trace: Json) -> None:
-    """Fill the area between a line and 0."""
+    """Fill the area between a line and 0, if it is the edge of a band."""
+    if "fill" not in trace:
+        return
     is_step = trace["line"].get("shape") == "hv"
     axes.fill_between(
         _known(trace["x"]),
