@@ -182,7 +182,10 @@ def _localization(trace: FlightTrace, flight: FlightMetrics) -> List[Section]:
     errors = [float(np.max(robot.errors[:, 0], initial=0.0)) for robot in trace.robots]
     shown = sorted(sorted(localized, key=lambda k: -errors[k])[: style.MAX_ROWS])
     caption = "" if flight.localization is None else f"{error_note(flight.localization)} "
-    caption += "A robot that is farther off than it believes does not know that it may be lost."
+    caption += (
+        "Bands are two standard deviations, as the robots believe. Errors far above them are those"
+        " of a robot that does not know that it is lost."
+    )
     if len(shown) < len(localized):
         caption += f" The {len(shown)} quadcopters with the largest errors are shown."
     return [plot_section("localization", "Localization", caption, localization_plot(trace, shown))]

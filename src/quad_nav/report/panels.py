@@ -151,9 +151,7 @@ def _reach(errors: Optional[Json]) -> Optional[Tuple[Sequence[float], Sequence[f
 def _scatter(axes: Axes, trace: Json) -> None:
     x, y, marker, line = trace["x"], _known(trace["y"]), trace.get("marker"), trace.get("line", {})
     name, reach = trace.get("name", ""), _reach(trace.get("error_y"))
-    if "fill" in trace:
-        ink, is_step = _ink(trace["fillcolor"]), line.get("shape") == "hv"
-        axes.fill_between(_known(x), y, color=ink, step="post" if is_step else None, lw=0)
+    _fill(axes, trace)
     if "lines" in trace["mode"]:
         axes.plot(
             _known(x),
@@ -190,6 +188,20 @@ def _scatter(axes: Axes, trace: Json) -> None:
             clip_on=False,
             **filled,
         )
+
+
+def _fill(axes: Axes, trace: Json) -> None:
+    """Fill the area between a line and 0, if it is the edge of a band."""
+    if "fill" not in trace:
+        return
+    is_step = trace["line"].get("shape") == "hv"
+    axes.fill_between(
+        _known(trace["x"]),
+        _known(trace["y"]),
+        color=_ink(trace["fillcolor"]),
+        step="post" if is_step else None,
+        lw=0,
+    )
 
 
 def _bars(axes: Axes, trace: Json) -> None:

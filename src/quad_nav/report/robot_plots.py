@@ -117,7 +117,7 @@ def _errors(robot: RobotTrace, number: int, part: int, is_first: bool) -> Tuple[
         top = max(top, float(np.percentile(known, 95)) if len(known) else 0.0)
         line = {"color": rgb(number, 0.35), "width": 1, "shape": "hv"}
         band = {"fill": "tozeroy", "fillcolor": rgb(number, 0.15), "line": line}
-        group = {"name": "2 standard deviations, as believed", "legendgroup": "believed"}
+        group = {"name": "2σ as believed", "legendgroup": "believed"}
         traces.append(_line(robot.times_s, believed, **band, **group, **legend))
     if len(robot.errors):
         error = robot.errors[:, part]

@@ -257,7 +257,7 @@ def test_errors_of_robots_that_find_their_places():
     assert "0.040, 0.060 m" in page.html
     assert "Localization: 0.040 m and 0.004 rad from the truth" in page.html
     curves = {(one["name"], one["yaxis"]): one["y"] for one in localization_of(page)["data"]}
-    believed = "2 standard deviations, as believed"
+    believed = "2σ as believed"
     assert curves["error", "y"] == pytest.approx([0.02] * 401)
     assert curves["error", "y3"] == pytest.approx([0.06] * 401)
     assert curves["error", "y4"] == pytest.approx([0.006] * 401)
@@ -286,5 +286,5 @@ def test_only_the_quadcopters_with_the_largest_errors_are_shown():
 def test_without_the_truth_there_are_deviations_alone():
     page = flight_page(flight(replace(localized(0, 0.02), believed=np.zeros((0, 3)))))
     shown = {one["name"] for one in localization_of(page)["data"]}
-    assert shown == {"2 standard deviations, as believed"}
+    assert shown == {"2σ as believed"}
     assert "from the truth" not in page.html
