@@ -118,6 +118,13 @@ class Amcl:
         return self.search is not None and self.search.is_on
 
     @property
+    def cloud(self) -> Floats:
+        """Poses float64[n, 3] to show: the particles, or the places that a search considers."""
+        if self.search is not None and self.search.is_on and len(self.search.poses):
+            return self.search.poses
+        return np.empty((0, 3)) if self.particles is None else self.particles.poses
+
+    @property
     def _is_spread(self) -> bool:
         """The heaviest cluster is light or wide: random particles of the recovery spread all."""
         limit_m = self.params.lost_above_m
@@ -217,7 +224,7 @@ class Amcl:
         )
         if beams is not None:
             self._leave_out_peers(beams, seen)
-        update: Optional[Update] = Update()
+        update: Optional[Update] = Update(shows_cloud=True)
         if not self.is_searching:
             update = self._filter(particles, laser, beams, odometry, at)
         if beams is None or update is None or not self._is_judged:
