@@ -27,6 +27,9 @@ _SURE = 0.5
 """Weight of a cluster below which another place is as likely."""
 _FOUND = np.diag((0.05**2, 0.05**2, 0.02**2))
 """Covariance of a pose that a search has found, in m and rad."""
+_PATIENCE = 5
+"""Scans in a row that do not fit before the whole map is searched: particles that were spread about
+a pose that is roughly known need some."""
 
 
 @dataclass(frozen=True)
@@ -104,18 +107,26 @@ class Amcl:
         self._distances_m: Floats
         self._lasers: Dict[str, Laser] = {}
         self._given: Optional[PoseEstimate] = None  # before the map
+        self._misfits = 0  # scans in a row that do not fit the estimate
         self._has_begun = False  # since the last initialisation
         self._odometry = Pose2D(0.0, 0.0)  # at the last update
 
     @property
     def is_lost(self) -> bool:
         """The robot does not know its place, so that it has to hover until scans tell it."""
-        return self.is_searching or self._is_spread
+        return self.is_searching or self._misfits > 0 or self._is_spread
 
     @property
     def is_searching(self) -> bool:
-        """Scans do not fit the estimate, so that the whole map is searched."""
+        """The whole map is searched: scans do not fit the estimate, or there is none."""
         return self.search is not None and self.search.is_on
+
+    @property
+    def cloud(self) -> Floats:
+        """Poses float64[n, 3] to show: the particles, or the places that a search considers."""
+        if self.search is not None and self.search.is_on and len(self.search.poses):
+            return self.search.poses
+        return np.empty((0, 3)) if self.particles is None else self.particles.poses
 
     @property
     def _is_spread(self) -> bool:
@@ -153,7 +164,7 @@ class Amcl:
         if self.particles is None or not len(self.particles.free_places):
             return False
         self.particles.spread_uniformly()
-        self._has_begun = False
+        self._has_begun, self._misfits = False, 0
         if self.search is not None and self._is_judged:
             self.search.begin()
         return True
@@ -193,7 +204,7 @@ class Amcl:
             self.seed(self._spreads)
         mean = np.array((about.pose.x_m, about.pose.y_m, about.pose.yaw_rad))
         self.particles.spread_normally(mean, about.covariance)
-        self._has_begun = False
+        self._has_begun, self._misfits = False, 0
         if self.search is not None:
             self.search.is_on = False
 
@@ -217,7 +228,7 @@ class Amcl:
         )
         if beams is not None:
             self._leave_out_peers(beams, seen)
-        update: Optional[Update] = Update()
+        update: Optional[Update] = Update(shows_cloud=True)
         if not self.is_searching:
             update = self._filter(particles, laser, beams, odometry, at)
         if beams is None or update is None or not self._is_judged:
@@ -281,8 +292,10 @@ class Amcl:
             here = self.map_from_odom.compose(odom_from_base).to_2d()
             self.fit = search.fit(here, points)
             if self.fit >= self.params.lost_below or self._is_spread:
-                search.is_on = False
-            elif not search.is_on:
+                search.is_on, self._misfits = False, 0
+            else:
+                self._misfits += 1
+            if self._misfits > _PATIENCE and not search.is_on:
                 search.begin()
         if not search.is_on:
             return None

@@ -118,9 +118,8 @@ class AmclLocalization(Localization):
         return None if last is None else (self._place(robot), last.covariance)
 
     def particles(self, robot: int) -> Optional[NDArray[np.float64]]:
-        """Return the particles."""
-        particles = self.amcls[robot].particles
-        return None if particles is None else particles.poses
+        """Return the particles, or the places that a search considers."""
+        return self.amcls[robot].cloud
 
     def set_pose(self, robot: int, pose: Pose2D, covariance: NDArray[np.float64]) -> bool:
         """Tell a robot where it is."""

@@ -35,8 +35,8 @@ _REACHES = np.array([(0.15, 0.15, 0.08), (0.07, 0.07, 0.03), (0.03, 0.03, 0.015)
 _TRIES = 16
 _APART_M, _APART_RAD = 0.5, 0.35
 """Poses that are nearer are one place."""
-_BASIN = 0.4 * 0.4 * 0.3
-"""m^2 rad about a place from which a random pose is led to it; mostly it is twice as large."""
+_BASIN = 0.3 * 0.3 * 0.15
+"""m^2 rad about a place from which a random pose is led to it; often it is ten times as large."""
 _COVERAGE = 5.0
 """Random poses for each basin until all places but exp(-5) have had one."""
 _MARGIN = 0.05

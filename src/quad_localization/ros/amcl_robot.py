@@ -282,7 +282,7 @@ class AmclRobot:
                 self._warn("no map yet: no transform until there is one")
             if particles is None or update is None:
                 return
-            poses = particles.poses.copy() if update.shows_cloud else None
+            poses = self._amcl.cloud.copy() if update.shows_cloud else None
         if poses is not None:
             frame = params.global_frame_id
             self._cloud.publish(pose_array_message(poses, rospy.get_time(), frame))
@@ -299,7 +299,7 @@ class AmclRobot:
             until = stamp + rospy.Duration(params.transform_tolerance_s)
             self._send(transform_message(transform, *frames, until))
         rate_hz, now_s = params.save_pose_rate_hz, rospy.get_time()
-        is_due = rate_hz > 0.0 and now_s - self._saved_s >= 1.0 / rate_hz
+        is_due = rate_hz > 0.0 and not is_lost and now_s - self._saved_s >= 1.0 / rate_hz
         if update.estimate is None and is_due and not self._saver.is_alive():
             self._saved_s = now_s
             self._saver = threading.Thread(target=self.save_pose, daemon=True)
