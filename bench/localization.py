@@ -3,7 +3,7 @@
     python bench/localization.py amcl scenes/arena.yaml goals --robots 2 --seeds 100
 
 Cases: ``people``: ten walk and keep away from quadcopters; ``unknown``: amcl's map lacks an
-obstacle, another one for each seed; ``kidnapped``: after 2 to 20 s the particles are 3 m away;
+obstacle, another one for each seed; ``kidnapped``: after 2 to 10 s the particles are 3 m away;
 ``global``: they are all over the map. The ratio is that of the times with the localization and with
 perfect poses. *Right* are flights that end with an error below 0.2 m, not lost, and the time until
 it stays so; *wrong* is the time with a larger error in which robot 0 is not lost. *Drawn* are the
@@ -36,7 +36,7 @@ from quad_nav.sim.simulation_params import SimulationParams
 CASES = ("mission", "people", "unknown", "kidnapped", "global")
 PERFECT = SimulationParams(LidarParams(noise_std_m=0.01), jitter_m=0.2)
 DRIFT = OdometryErrors(per_m=0.05, per_rad=0.05)
-MISPLACED_S, JUMP_M = (2.0, 20.0), 3.0
+MISPLACED_S, JUMP_M = (2.0, 10.0), 3.0
 RIGHT_M, ODOMETRY_HZ = 0.2, 40.0
 
 

@@ -79,7 +79,7 @@ def test_help_has_groups_an_example_and_every_configuration():
         ("preview -o x.txt", "preview not made, invalid input:\n  --output: x.txt: expected a"),
         ("check defalt", "config: defalt: expected a folder, a YAML file, a launch file, or the"),
         ("check defalt", "did you mean default?"),
-        ("check nope", "there are barn, default, moving, people, tutorial"),
+        ("check nope", "there are barn, default, localized, moving, people, tutorial"),
         ("check nope.yaml", "cannot be read: No such file or directory"),
     ],
 )
