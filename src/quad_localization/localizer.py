@@ -222,10 +222,8 @@ class Amcl:
         if seen.laser not in self._lasers:  # whose mount stays that of its first scan
             place = (float(mount.x_m), float(mount.y_m))
             self._lasers[seen.laser] = Laser(params, grid, self._distances_m, place)
-        laser, odometry = (
-            self._lasers[seen.laser],
-            Pose2D(at.x_m, at.y_m, tilted_yaw(at.quaternion)),
-        )
+        laser = self._lasers[seen.laser]
+        odometry = Pose2D(at.x_m, at.y_m, tilted_yaw(at.quaternion))
         if beams is not None:
             self._leave_out_peers(beams, seen)
         update: Optional[Update] = Update(shows_cloud=True)
@@ -343,9 +341,10 @@ class Amcl:
     ) -> Optional[PoseEstimate]:
         """Return the mean of the heaviest cluster, and note the transform that follows."""
         statistics = particles.statistics
-        if statistics.best < 0:
+        best = statistics.best
+        if best < 0:
             return None
-        pose = Pose2D(*statistics.means[statistics.best].tolist())
+        pose = Pose2D(*statistics.means[best].tolist())
         self.estimate = PoseEstimate(pose, statistics.covariance)
         if not self.params.upstream:  # which puts a quadcopter, and its LIDAR, on the floor
             odom_from_base = odom_from_base.to_2d().to_3d()

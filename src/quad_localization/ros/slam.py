@@ -234,5 +234,9 @@ def main() -> int:
             )
             return EXIT_BAD_INPUT
         starts[number] = Pose2D(*map(float, given))
-    SlamNode(robots, starts).spin()
+    try:
+        SlamNode(robots, starts).spin()
+    except rospy.ROSException:
+        if not rospy.is_shutdown():  # publishing fails then
+            raise
     return 0
