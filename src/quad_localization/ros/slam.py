@@ -237,6 +237,6 @@ def main() -> int:
     try:
         SlamNode(robots, starts).spin()
     except rospy.ROSException:
-        if not rospy.is_shutdown():  # publishing fails then
+        if not rospy.core.is_shutdown_requested():  # at shutdown rospy closes the topics
             raise
     return 0
