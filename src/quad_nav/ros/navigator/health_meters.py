@@ -51,7 +51,7 @@ class NavigatorHealth:
 
     def __init__(self, node: str, robot: str, inputs: Sequence[InputMeter]) -> None:
         self._node, self._robot, self._inputs = node, robot, inputs
-        self._state, self._is_localized = State.IDLE, False
+        self._state, self._is_localized = State.IDLE, True  # no tick has told otherwise
         self._cycles = self._cycles_read = 0
         self._cycle_s = 0.0
         self._busy_since_s = self._read_s = self._fault_s = self._reason_s = 0.0
