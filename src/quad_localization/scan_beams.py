@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Optional
+from typing import Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,12 @@ class Beams:
     ranges_m: NDArray[np.float64]
     bearings_rad: NDArray[np.float64]
     range_max_m: float
+
+    def ends(self, mount: Tuple[float, float]) -> NDArray[np.float64]:
+        """Return the ends float64[n, 2] in the base frame of a laser at a place of the base."""
+        directions = np.column_stack((np.cos(self.bearings_rad), np.sin(self.bearings_rad)))
+        ends: NDArray[np.float64] = mount + self.ranges_m[:, None] * directions
+        return ends
 
 
 def beams_of(

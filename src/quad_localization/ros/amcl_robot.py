@@ -45,7 +45,6 @@ from quad_nav.topics.health import Health, Level
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.validation import grid_problem
 
-_QUEUE = 100
 _POLL_S = 0.01  # wall time: how late a transform is noticed
 _TF_WAIT_S = 0.5
 _ASK_AGAIN_S = 0.5
@@ -83,10 +82,8 @@ class AmclRobot:
         rospy.loginfo("%s: seed of the random numbers: %d", self.name, seed)
         self._amcl, self._lock = Amcl(params, seed), threading.RLock()
         self._transforms, self._send = transforms, send
-        self._waiting: Optional[Tuple[rospy.Time, Observation]] = None  # for the map
-        self._seen_s: Optional[float] = None  # stamp of the last scan
+        self._last: Optional[Tuple[rospy.Time, Observation]] = None
         self._saved_s, self._saver = 0.0, threading.Thread()
-        self._odom_from_base: Optional[Pose3D] = None
         self._start: Optional[PoseEstimate] = None
         self._pose = rospy.Publisher(
             names("amcl_pose"), PoseWithCovarianceStamped, queue_size=2, latch=True
@@ -120,10 +117,6 @@ class AmclRobot:
     def leaves_out_peers(self) -> bool:
         """Whether beams that end on peers are left out."""
         return self.params.peer_radius_m > 0.0 and not self.params.upstream
-
-    def restart(self) -> None:
-        """Go on after the clock has jumped back."""
-        self._saved_s = 0.0
 
     def reset(self) -> None:
         """Begin anew at the pose of the start, after a reset of the simulation."""
@@ -179,8 +172,8 @@ class AmclRobot:
         with self._lock:
             start = PoseEstimate(pose, np.diag(variances))
             self._start = self._start or start
+            waiting = None if self._amcl.has_map else self._last
             self._amcl.set_map(grid, start)
-            waiting, self._waiting = self._waiting, None
         rospy.loginfo("%s: map of %d x %d cells", self.name, info.width, info.height)
         if waiting is not None:
             self.localise(*waiting)
@@ -273,14 +266,12 @@ class AmclRobot:
     def localise(self, stamp: rospy.Time, seen: Observation) -> None:
         """Take a scan and publish what it tells; without a map it waits for the map."""
         with self._lock:
-            self._seen_s, self._odom_from_base = stamp.to_sec(), seen.odom_from_base
-            update, params = self._amcl.update(seen), self.params
-            is_lost, particles = self._amcl.is_lost, self._amcl.particles
-            transform = self._amcl.map_from_odom
-            if particles is None:
-                self._waiting = stamp, seen
+            self._last = stamp, seen
+            if not self._amcl.has_map:
                 self._warn("no map yet: no transform until there is one")
-            if particles is None or update is None:
+            update, params = self._amcl.update(seen), self.params
+            is_lost, transform = self._amcl.is_lost, self._amcl.map_from_odom
+            if update is None:
                 return
             poses = self._amcl.cloud.copy() if update.shows_cloud else None
         if poses is not None:
@@ -299,7 +290,7 @@ class AmclRobot:
             until = stamp + rospy.Duration(params.transform_tolerance_s)
             self._send(transform_message(transform, *frames, until))
         rate_hz, now_s = params.save_pose_rate_hz, rospy.get_time()
-        is_due = rate_hz > 0.0 and not is_lost and now_s - self._saved_s >= 1.0 / rate_hz
+        is_due = rate_hz > 0.0 and not is_lost and abs(now_s - self._saved_s) >= 1.0 / rate_hz
         if update.estimate is None and is_due and not self._saver.is_alive():
             self._saved_s = now_s
             self._saver = threading.Thread(target=self.save_pose, daemon=True)
@@ -308,11 +299,12 @@ class AmclRobot:
     def save_pose(self) -> None:
         """Store the present pose as the parameters of the initial one."""
         with self._lock:
-            transform, odometry = self._amcl.map_from_odom, self._odom_from_base
-            estimate = self._amcl.estimate
-        if transform is None or odometry is None or estimate is None:
+            transform, estimate = self._amcl.map_from_odom, self._amcl.estimate
+            last = self._last
+        if transform is None or estimate is None or last is None:
             return
-        pose, variances = transform.compose(odometry), np.diag(estimate.covariance).tolist()
+        pose = transform.compose(last[1].odom_from_base)
+        variances = np.diag(estimate.covariance).tolist()
         values = (pose.x_m, pose.y_m, tilted_yaw(pose.quaternion), *variances)
         for name, value in zip(
             ("pose_x", "pose_y", "pose_a", "cov_xx", "cov_yy", "cov_aa"), values
@@ -325,7 +317,7 @@ class AmclRobot:
         level, message = Level.OK, "OK"
         values = {}
         search, fit = self._amcl.search, self._amcl.fit
-        if search is None:
+        if not self._amcl.has_map:
             level, message = Level.ERROR, "no map"
         elif self._amcl.is_lost:
             level, message = Level.ERROR, "lost"
@@ -333,7 +325,7 @@ class AmclRobot:
                 message += (
                     ": other places fit as well" if search.is_ambiguous else ": no place fits"
                 )
-        elif self._seen_s is None or rospy.get_time() - self._seen_s > SILENT_S:
+        elif self._last is None or rospy.get_time() - self._last[0].to_sec() > SILENT_S:
             level, message = Level.WARN, "no scans with odometry"
         elif estimate is None:
             level, message = Level.WARN, "no pose"
