@@ -262,12 +262,9 @@ class Amcl:
     def _judge(
         self, points: Floats, odometry: Pose2D, odom_from_base: Pose3D
     ) -> Optional[PoseEstimate]:
-        """Compare the ends of beams with the map; search while they do not fit.
+        """Compare the ends of beams with the map; return the place if a search has found it.
 
         While a search goes on, the particles wait at the last estimate, which may be right.
-
-        Returns:
-            The estimate, if the search has found the place.
         """
         search = self.search
         if not len(points):
@@ -332,11 +329,3 @@ class Amcl:
             odom_from_base = odom_from_base.to_2d().to_3d()
         self.map_from_odom = pose.to_3d().compose(odom_from_base.inverse())
         return self.estimate
-
-
-def is_covariance(matrix: Floats) -> bool:
-    """Tell whether float64[3, 3] is finite and, rounding apart, positive semidefinite."""
-    if not np.all(np.isfinite(matrix)):
-        return False
-    values = np.linalg.eigvalsh(0.5 * (matrix + matrix.T))
-    return bool(values[0] >= -1e-9 * max(1.0, abs(float(values[-1]))))

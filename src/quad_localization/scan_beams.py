@@ -50,13 +50,7 @@ def beams_of(
     """Return the beams of a scan, None if its limits are not sound.
 
     The bearings follow linearly from the first two beams, which also serves a laser that is upside
-    down.
-
-    Args:
-        scan: The scan.
-        base_from_laser: Mount of the laser.
-        min_range_m: Raises the scan's least range if above 0.
-        max_range_m: Lowers its largest range if above 0.
+    down. Limits of the range that are above 0 narrow those of the scan.
     """
     largest_m, least_m = np.float32(scan.range_max_m), np.float32(scan.range_min_m)
     if max_range_m > 0.0:

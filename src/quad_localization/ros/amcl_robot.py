@@ -13,15 +13,9 @@ from typing import Any, Callable, Dict, Optional, Tuple
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import (
-    PoseArray,
-    PoseWithCovariance,
-    PoseWithCovarianceStamped,
-    TransformStamped,
-)
+from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap, SetMap, SetMapRequest, SetMapResponse
-from std_msgs.msg import Header
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from quad_localization.localizer import Amcl, Observation, PoseEstimate
@@ -30,12 +24,9 @@ from quad_localization.parameters import AmclParams, read_params
 from quad_localization.ros.given_pose import given_pose
 from quad_localization.scan_beams import tilted_yaw
 from quad_nav.errors import excerpt
-from quad_nav.geometry import Pose2D, Pose3D, covariance_36
+from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.parameter import parameters_of
-from quad_nav.ros.common.conversions import (
-    pose_message,
-    transform_message,
-)
+from quad_nav.ros.common.conversions import pose_estimate_message, transform_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.packed_messages import pose_array_message
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
@@ -68,13 +59,7 @@ class AmclRobot:
         send: Callable[[TransformStamped], None],
         names: Names = own_node,
     ) -> None:
-        """Read the parameters, advertise, and ask for the map.
-
-        Args:
-            transforms: Transform tree.
-            send: Publishes a transform.
-            names: Names of topics, services and parameters.
-        """
+        """Read the parameters, advertise, and ask for the map; ``send`` publishes transforms."""
         self.name = (rospy.get_name() if names is own_node else names("~")).strip("/")
         self._warnings, self._names = ThrottledWarnings(), names
         params = self._read(rospy.get_param(names("~"), {}))
@@ -124,14 +109,14 @@ class AmclRobot:
             if self._start is not None:
                 self._amcl.set_pose(self._start)
 
+    def _warn(self, text: str) -> None:
+        self._warnings.warn(f"{self.name}: {text}")
+
     def _read(self, given: Dict[str, Any]) -> AmclParams:
         params, faults = read_params(given)
         for fault in faults:
             self._warn(fault)
         return params
-
-    def _warn(self, text: str) -> None:
-        self._warnings.warn(f"{self.name}: {text}")
 
     # Maps.
 
@@ -162,15 +147,8 @@ class AmclRobot:
             self._warn(f"the map is in frame '{excerpt(frame)}', expected '{wanted}'; using it")
         cells = np.array(message.data, np.int8).reshape(info.height, info.width)
         grid = OccupancyMap.from_occupancy(cells, info.resolution, *place, self.params.upstream)
-        given = rospy.get_param(self._names("~"), {})
-        one = self._read(given)
-        pose = Pose2D(one.initial_pose_x_m, one.initial_pose_y_m, one.initial_pose_a_rad)
-        if "initial_pose_x" not in given:  # neither a launch file nor `save_pose` has set it
-            start = rospy.get_param(f"{_STARTS}/quad{self.robot}", None)
-            pose = Pose2D(*start) if start else pose
-        variances = (one.initial_cov_xx, one.initial_cov_yy, one.initial_cov_aa)
+        start = self._initial_pose()
         with self._lock:
-            start = PoseEstimate(pose, np.diag(variances))
             self._start = self._start or start
             waiting = None if self._amcl.has_map else self._last
             self._amcl.set_map(grid, start)
@@ -178,6 +156,16 @@ class AmclRobot:
         if waiting is not None:
             self.localise(*waiting)
         return True
+
+    def _initial_pose(self) -> PoseEstimate:
+        """Return where the parameters say that it is; without them where the scene starts it."""
+        given = rospy.get_param(self._names("~"), {})
+        params = self._read(given)
+        row = params.initial_pose_x_m, params.initial_pose_y_m, params.initial_pose_a_rad
+        if "initial_pose_x" not in given:  # neither a launch file nor `save_pose` has set it
+            row = rospy.get_param(f"{_STARTS}/quad{self.robot}", None) or row
+        variances = params.initial_cov_xx, params.initial_cov_yy, params.initial_cov_aa
+        return PoseEstimate(Pose2D(*row), np.diag(variances))
 
     def _on_set_map(self, request: SetMapRequest) -> SetMapResponse:
         with self._lock:
@@ -274,24 +262,19 @@ class AmclRobot:
             if update is None:
                 return
             poses = self._amcl.cloud.copy() if update.shows_cloud else None
+        frame, found = params.global_frame_id, update.estimate
         if poses is not None:
-            frame = params.global_frame_id
             self._cloud.publish(pose_array_message(poses, rospy.get_time(), frame))
-        if update.estimate is not None:
-            estimate = update.estimate
-            covariance = covariance_36(estimate.covariance).tolist()
-            pose = PoseWithCovariance(pose_message(estimate.pose.to_3d()), covariance)
-            header = Header(0, stamp, params.global_frame_id)
-            self._pose.publish(PoseWithCovarianceStamped(header, pose))
+        if found is not None:
+            self._pose.publish(pose_estimate_message(found.pose, found.covariance, frame, stamp))
         if transform is None:
             return
         if params.tf_broadcast and not is_lost:  # without it the navigator stops
-            frames = params.global_frame_id, params.odom_frame_id
             until = stamp + rospy.Duration(params.transform_tolerance_s)
-            self._send(transform_message(transform, *frames, until))
+            self._send(transform_message(transform, frame, params.odom_frame_id, until))
         rate_hz, now_s = params.save_pose_rate_hz, rospy.get_time()
         is_due = rate_hz > 0.0 and not is_lost and abs(now_s - self._saved_s) >= 1.0 / rate_hz
-        if update.estimate is None and is_due and not self._saver.is_alive():
+        if found is None and is_due and not self._saver.is_alive():
             self._saved_s = now_s
             self._saver = threading.Thread(target=self.save_pose, daemon=True)
             self._saver.start()  # the ROS master may hang
