@@ -78,11 +78,8 @@ class Laser:
     def ends(self, beams: Beams) -> Floats:
         """Return the ends float64[n, 2] of the beams in use that return, in the base frame."""
         used = self._used(beams)
-        ranges_m, bearings_rad = beams.ranges_m[used], beams.bearings_rad[used]
-        directions = np.column_stack((np.cos(bearings_rad), np.sin(bearings_rad)))
-        returns = ranges_m < beams.range_max_m  # false for NaN
-        ends: Floats = self._mount + ranges_m[returns, None] * directions[returns]
-        return ends
+        returns = beams.ranges_m[used] < beams.range_max_m  # false for NaN
+        return beams.ends(self._mount)[used][returns]
 
     def _used(self, beams: Beams) -> slice:
         """Return which beams are in use."""

@@ -83,11 +83,12 @@ class Amcl:
 
     Attributes:
         params: Parameters in force.
-        particles: The particle filter, None before the first map.
+        has_map: Whether a map has come; before it, there are no particles.
+        particles: The particle filter.
         estimate: Latest estimate, None before the first.
         map_from_odom: Latest transform.
         fit: Share of the last scan's beams that end near an obstacle of the map; None without any.
-        search: The search for the place of a lost robot, None before the first map.
+        search: The search of the whole map, on while scans do not fit the estimate.
         is_update_requested: Whether the next scan updates without motion.
         update_count: Updates since the last initialisation.
     """
@@ -95,16 +96,17 @@ class Amcl:
     def __init__(self, params: AmclParams, seed: int) -> None:
         """Start without a map; upstream's seeds are the numbers of its initialisations."""
         self.params = params
-        self.particles: Optional[ParticleFilter] = None
+        self.has_map = False
         self.estimate: Optional[PoseEstimate] = None
         self.map_from_odom: Optional[Pose3D] = None
         self.fit: Optional[float] = None
-        self.search: Optional[PlaceSearch] = None
         self.is_update_requested = False
         self.update_count = 0
         self._random, self._spreads = seeded(seed), 0
-        self._grid: Optional[OccupancyMap] = None
-        self._distances_m: Floats
+        self._grid = OccupancyMap.from_occupancy(np.empty((0, 0), np.int8), 1.0, 0.0, 0.0)
+        self._distances_m = np.empty((0, 0))  # of its cells to obstacles
+        self.search = PlaceSearch(self._grid, self._distances_m, self._random)
+        self.particles = ParticleFilter(params, self._grid.free_places, self._random)
         self._lasers: Dict[str, Laser] = {}
         self._given: Optional[PoseEstimate] = None  # before the map
         self._misfits = 0  # scans in a row that do not fit the estimate
@@ -114,25 +116,20 @@ class Amcl:
     @property
     def is_lost(self) -> bool:
         """The robot does not know its place, so that it has to hover until scans tell it."""
-        return self.is_searching or self._misfits > 0 or self._is_spread
-
-    @property
-    def is_searching(self) -> bool:
-        """The whole map is searched: scans do not fit the estimate, or there is none."""
-        return self.search is not None and self.search.is_on
+        return self.search.is_on or self._misfits > 0 or self._is_spread
 
     @property
     def cloud(self) -> Floats:
         """Poses float64[n, 3] to show: the particles, or the places that a search considers."""
-        if self.search is not None and self.search.is_on and len(self.search.poses):
+        if self.search.is_on and len(self.search.poses):
             return self.search.poses
-        return np.empty((0, 3)) if self.particles is None else self.particles.poses
+        return self.particles.poses
 
     @property
     def _is_spread(self) -> bool:
         """The heaviest cluster is light or wide: random particles of the recovery spread all."""
         limit_m = self.params.lost_above_m
-        if self.particles is None or limit_m == 0.0 or self.params.upstream:
+        if not self.has_map or limit_m == 0.0 or self.params.upstream:
             return False
         statistics = self.particles.statistics
         if statistics.best < 0 or statistics.weights[statistics.best] < _SURE:
@@ -145,9 +142,10 @@ class Amcl:
         A further map leaves the particles where they are; upstream begins anew.
         """
         self._make_sensors(grid)
-        if self.particles is not None and not self.params.upstream:
+        if self.has_map and not self.params.upstream:
             self.particles.free_places = grid.free_places
             return
+        self.has_map = True
         self.particles = ParticleFilter(self.params, grid.free_places, self._random)
         self._spread(initial)
         if self._given is not None:
@@ -155,17 +153,17 @@ class Amcl:
 
     def set_pose(self, given: PoseEstimate) -> None:
         """Begin anew at a pose; without a map, when it comes."""
-        self._given = given if self.particles is None else None
-        if self.particles is not None:
+        self._given = None if self.has_map else given
+        if self.has_map:
             self._spread(given)
 
     def set_uniform(self) -> bool:
         """Begin anew all over the free cells; return false if there are none."""
-        if self.particles is None or not len(self.particles.free_places):
+        if not len(self.particles.free_places):
             return False
         self.particles.spread_uniformly()
         self._has_begun, self._misfits = False, 0
-        if self.search is not None and self._is_judged:
+        if self._is_judged:
             self.search.begin()
         return True
 
@@ -178,12 +176,9 @@ class Amcl:
 
         Upstream begins anew at its last estimate, or at the origin before the first.
         """
-        self.params = params
-        if self._grid is None or self.particles is None:
-            return
+        self.params = self.particles.params = params
         self._make_sensors(self._grid)
-        self.particles.params = params
-        if params.upstream:
+        if params.upstream and self.has_map:
             self.particles = ParticleFilter(params, self._grid.free_places, self._random)
             last = self.estimate or PoseEstimate(Pose2D(0.0, 0.0), np.zeros((3, 3)))
             self._spread(PoseEstimate(last.pose, np.diag(np.diag(last.covariance))))
@@ -192,28 +187,25 @@ class Amcl:
         """Measure a map, and forget the lasers."""
         self._grid, self._lasers = grid, {}
         self._distances_m = obstacle_distances(grid, self.params.laser_likelihood_max_dist_m)
-        was_searching = self.is_searching
+        was_searching = self.search.is_on
         self.search = PlaceSearch(grid, self._distances_m, self._random)
         if was_searching:
             self.search.begin()
 
     def _spread(self, about: PoseEstimate) -> None:
-        assert self.particles is not None
         self._spreads += 1
         if self.params.upstream:
             self.seed(self._spreads)
         mean = np.array((about.pose.x_m, about.pose.y_m, about.pose.yaw_rad))
         self.particles.spread_normally(mean, about.covariance)
         self._has_begun, self._misfits = False, 0
-        if self.search is not None:
-            self.search.is_on = False
+        self.search.is_on = False
 
     def update(self, seen: Observation) -> Optional[Update]:
         """Take a scan; return None if nothing was done with it."""
-        particles, grid, params = self.particles, self._grid, self.params
-        if particles is None or grid is None:
+        if not self.has_map:
             return None
-        mount, at = seen.base_from_laser, seen.odom_from_base
+        params, mount, at = self.params, seen.base_from_laser, seen.odom_from_base
         beams = beams_of(seen.scan, mount, params.laser_min_range_m, params.laser_max_range_m)
         if not params.upstream:
             if beams is None:
@@ -221,29 +213,24 @@ class Amcl:
             beams = levelled(beams, at.quaternion)
         if seen.laser not in self._lasers:  # whose mount stays that of its first scan
             place = (float(mount.x_m), float(mount.y_m))
-            self._lasers[seen.laser] = Laser(params, grid, self._distances_m, place)
+            self._lasers[seen.laser] = Laser(params, self._grid, self._distances_m, place)
         laser = self._lasers[seen.laser]
         odometry = Pose2D(at.x_m, at.y_m, tilted_yaw(at.quaternion))
         if beams is not None:
             self._leave_out_peers(beams, seen)
         update: Optional[Update] = Update(shows_cloud=True)
-        if not self.is_searching:
-            update = self._filter(particles, laser, beams, odometry, at)
+        if not self.search.is_on:
+            update = self._filter(laser, beams, odometry, at)
         if beams is None or update is None or not self._is_judged:
             return update
-        found = self._judge(particles, laser.ends(beams), odometry, at)
+        found = self._judge(laser.ends(beams), odometry, at)
         return update if found is None else replace(update, estimate=found)
 
     def _filter(
-        self,
-        particles: ParticleFilter,
-        laser: Laser,
-        beams: Optional[Beams],
-        odometry: Pose2D,
-        odom_from_base: Pose3D,
+        self, laser: Laser, beams: Optional[Beams], odometry: Pose2D, odom_from_base: Pose3D
     ) -> Optional[Update]:
         """Move, weigh and resample the particles, if that is due."""
-        begins, params = not self._has_begun, self.params
+        begins, particles = not self._has_begun, self.particles
         if begins:
             self._odometry, self._has_begun, self.update_count = odometry, True, 0
         if begins or self._is_update_due(odometry):
@@ -252,7 +239,7 @@ class Amcl:
         if not laser.is_due:
             return Update()
         if not begins:
-            self._move(particles, odometry)
+            self._move(odometry)
         if beams is None:  # upstream has moved the particles, and will move them again
             return None
         laser.is_due = False
@@ -261,10 +248,10 @@ class Amcl:
             particles.weigh(factors)
         self._odometry = odometry
         self.update_count += 1
-        is_resampled = self.update_count % max(params.resample_interval, 1) == 0
+        is_resampled = self.update_count % max(self.params.resample_interval, 1) == 0
         if is_resampled:
             particles.resample()
-        estimate = self._estimate(particles, odom_from_base) if is_resampled or begins else None
+        estimate = self._estimate(odom_from_base) if is_resampled or begins else None
         shows_cloud = not self.is_update_requested
         return Update(not begins, factors is not None, is_resampled, estimate, shows_cloud)
 
@@ -273,17 +260,14 @@ class Amcl:
         return self.params.lost_below > 0.0 and not self.params.upstream
 
     def _judge(
-        self, particles: ParticleFilter, points: Floats, odometry: Pose2D, odom_from_base: Pose3D
+        self, points: Floats, odometry: Pose2D, odom_from_base: Pose3D
     ) -> Optional[PoseEstimate]:
-        """Compare the ends of beams with the map; search while they do not fit.
+        """Compare the ends of beams with the map; return the place if a search has found it.
 
         While a search goes on, the particles wait at the last estimate, which may be right.
-
-        Returns:
-            The estimate, if the search has found the place.
         """
         search = self.search
-        if search is None or not len(points):
+        if not len(points):
             self.fit = None
             return None
         if self._has_begun and self.map_from_odom is not None:
@@ -301,7 +285,7 @@ class Amcl:
         if place is None or search.fit(place, points) < self.params.lost_below:
             return None
         self._spread(PoseEstimate(place, _FOUND))
-        return self._estimate(particles, odom_from_base)
+        return self._estimate(odom_from_base)
 
     def _is_update_due(self, odometry: Pose2D) -> bool:
         """Tell whether the robot has moved enough, or an update was requested."""
@@ -315,8 +299,8 @@ class Amcl:
             or abs(angle_difference(odometry.yaw_rad, before.yaw_rad)) > params.update_min_a_rad
         )
 
-    def _move(self, particles: ParticleFilter, odometry: Pose2D) -> None:
-        before = self._odometry
+    def _move(self, odometry: Pose2D) -> None:
+        before, particles = self._odometry, self.particles
         turn_rad = float(angle_difference(odometry.yaw_rad, before.yaw_rad))
         delta = (odometry.x_m - before.x_m, odometry.y_m - before.y_m, turn_rad)
         old_yaw_rad = odometry.yaw_rad - turn_rad
@@ -327,20 +311,15 @@ class Amcl:
         if self.map_from_odom is None or not len(seen.peers):
             return
         base = self.map_from_odom.compose(seen.odom_from_base).to_2d()
-        x_m, y_m = base.transform(seen.base_from_laser.x_m, seen.base_from_laser.y_m)
-        angles_rad = base.yaw_rad + beams.bearings_rad
-        ends = np.array((x_m, y_m)) + beams.ranges_m[:, None] * np.column_stack(
-            (np.cos(angles_rad), np.sin(angles_rad))
-        )
+        mount = seen.base_from_laser.x_m, seen.base_from_laser.y_m
         with np.errstate(over="ignore", invalid="ignore"):  # of ranges without a return
+            ends = base.transform_points(beams.ends(mount))
             away_m = np.linalg.norm(ends[:, None] - seen.peers, axis=2).min(axis=1)
         beams.ranges_m[away_m < self.params.peer_radius_m] = np.nan
 
-    def _estimate(
-        self, particles: ParticleFilter, odom_from_base: Pose3D
-    ) -> Optional[PoseEstimate]:
+    def _estimate(self, odom_from_base: Pose3D) -> Optional[PoseEstimate]:
         """Return the mean of the heaviest cluster, and note the transform that follows."""
-        statistics = particles.statistics
+        statistics = self.particles.statistics
         best = statistics.best
         if best < 0:
             return None
@@ -350,11 +329,3 @@ class Amcl:
             odom_from_base = odom_from_base.to_2d().to_3d()
         self.map_from_odom = pose.to_3d().compose(odom_from_base.inverse())
         return self.estimate
-
-
-def is_covariance(matrix: Floats) -> bool:
-    """Tell whether float64[3, 3] is finite and, rounding apart, positive semidefinite."""
-    if not np.all(np.isfinite(matrix)):
-        return False
-    values = np.linalg.eigvalsh(0.5 * (matrix + matrix.T))
-    return bool(values[0] >= -1e-9 * max(1.0, abs(float(values[-1]))))

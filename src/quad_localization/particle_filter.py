@@ -143,9 +143,7 @@ def draw_poses(poses: Floats, places: Floats, state: State) -> None:
 def resample_limit(cells: int, kld: Tuple[int, int, float, float]) -> int:
     """Return how many particles a number of histogram cells needs, by KLD sampling.
 
-    Args:
-        cells: Cells that hold a particle.
-        kld: Fewest and most particles, largest error of the distribution and normal quantile.
+    ``kld`` has fewest and most particles, largest error of the distribution and normal quantile.
     """
     least, most, error, quantile = kld
     if cells <= 1 or cells > most:
@@ -168,16 +166,9 @@ def _draw_by_weight(
     tree: Histogram,
     state: State,
 ) -> Floats:
-    """Draw poses by their weights until KLD sampling has enough.
+    """Draw poses by the sums float64[m] of their weights, until KLD sampling has enough.
 
-    Args:
-        poses: float64[m, 3].
-        sums: float64[m], sums of the weights up to each.
-        random_share: Share of random poses.
-        places: Places of random poses.
-        kld: As for ``resample_limit``.
-        tree: Empty histogram, filled.
-        state: Of the random numbers, changed.
+    A share of them is random. The tree, which is empty before, holds what is drawn.
     """
     most = max(kld[1], 1)
     drawn = np.empty((most, 3))

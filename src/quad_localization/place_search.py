@@ -52,13 +52,7 @@ class PlaceSearch:
     """
 
     def __init__(self, grid: OccupancyMap, distances_m: Floats, state: State) -> None:
-        """Take a map.
-
-        Args:
-            grid: The map.
-            distances_m: float64[y, x], of its cells to obstacles.
-            state: Of the random numbers.
-        """
+        """Take a map, its cells' distances to obstacles, and the state of the random numbers."""
         self._grid, self._state = grid, state
         away_m = np.append(distances_m, math.inf)  # the last value is that outside the map
         self._near = (away_m < _NEAR_M).astype(np.float64)

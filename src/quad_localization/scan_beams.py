@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Optional
+from typing import Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,12 @@ class Beams:
     bearings_rad: NDArray[np.float64]
     range_max_m: float
 
+    def ends(self, mount: Tuple[float, float]) -> NDArray[np.float64]:
+        """Return the ends float64[n, 2] in the base frame of a laser at a place of the base."""
+        directions = np.column_stack((np.cos(self.bearings_rad), np.sin(self.bearings_rad)))
+        ends: NDArray[np.float64] = mount + self.ranges_m[:, None] * directions
+        return ends
+
 
 def beams_of(
     scan: Scan, base_from_laser: Pose3D, min_range_m: float, max_range_m: float
@@ -44,13 +50,7 @@ def beams_of(
     """Return the beams of a scan, None if its limits are not sound.
 
     The bearings follow linearly from the first two beams, which also serves a laser that is upside
-    down.
-
-    Args:
-        scan: The scan.
-        base_from_laser: Mount of the laser.
-        min_range_m: Raises the scan's least range if above 0.
-        max_range_m: Lowers its largest range if above 0.
+    down. Limits of the range that are above 0 narrow those of the scan.
     """
     largest_m, least_m = np.float32(scan.range_max_m), np.float32(scan.range_min_m)
     if max_range_m > 0.0:

@@ -13,15 +13,9 @@ from typing import Any, Callable, Dict, Optional, Tuple
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import (
-    PoseArray,
-    PoseWithCovariance,
-    PoseWithCovarianceStamped,
-    TransformStamped,
-)
+from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap, SetMap, SetMapRequest, SetMapResponse
-from std_msgs.msg import Header
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from quad_localization.localizer import Amcl, Observation, PoseEstimate
@@ -30,12 +24,9 @@ from quad_localization.parameters import AmclParams, read_params
 from quad_localization.ros.given_pose import given_pose
 from quad_localization.scan_beams import tilted_yaw
 from quad_nav.errors import excerpt
-from quad_nav.geometry import Pose2D, Pose3D, covariance_36
+from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.parameter import parameters_of
-from quad_nav.ros.common.conversions import (
-    pose_message,
-    transform_message,
-)
+from quad_nav.ros.common.conversions import pose_estimate_message, transform_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.packed_messages import pose_array_message
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
@@ -45,7 +36,6 @@ from quad_nav.topics.health import Health, Level
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.validation import grid_problem
 
-_QUEUE = 100
 _POLL_S = 0.01  # wall time: how late a transform is noticed
 _TF_WAIT_S = 0.5
 _ASK_AGAIN_S = 0.5
@@ -69,13 +59,7 @@ class AmclRobot:
         send: Callable[[TransformStamped], None],
         names: Names = own_node,
     ) -> None:
-        """Read the parameters, advertise, and ask for the map.
-
-        Args:
-            transforms: Transform tree.
-            send: Publishes a transform.
-            names: Names of topics, services and parameters.
-        """
+        """Read the parameters, advertise, and ask for the map; ``send`` publishes transforms."""
         self.name = (rospy.get_name() if names is own_node else names("~")).strip("/")
         self._warnings, self._names = ThrottledWarnings(), names
         params = self._read(rospy.get_param(names("~"), {}))
@@ -83,10 +67,8 @@ class AmclRobot:
         rospy.loginfo("%s: seed of the random numbers: %d", self.name, seed)
         self._amcl, self._lock = Amcl(params, seed), threading.RLock()
         self._transforms, self._send = transforms, send
-        self._waiting: Optional[Tuple[rospy.Time, Observation]] = None  # for the map
-        self._seen_s: Optional[float] = None  # stamp of the last scan
+        self._last: Optional[Tuple[rospy.Time, Observation]] = None
         self._saved_s, self._saver = 0.0, threading.Thread()
-        self._odom_from_base: Optional[Pose3D] = None
         self._start: Optional[PoseEstimate] = None
         self._pose = rospy.Publisher(
             names("amcl_pose"), PoseWithCovarianceStamped, queue_size=2, latch=True
@@ -121,24 +103,20 @@ class AmclRobot:
         """Whether beams that end on peers are left out."""
         return self.params.peer_radius_m > 0.0 and not self.params.upstream
 
-    def restart(self) -> None:
-        """Go on after the clock has jumped back."""
-        self._saved_s = 0.0
-
     def reset(self) -> None:
         """Begin anew at the pose of the start, after a reset of the simulation."""
         with self._lock:
             if self._start is not None:
                 self._amcl.set_pose(self._start)
 
+    def _warn(self, text: str) -> None:
+        self._warnings.warn(f"{self.name}: {text}")
+
     def _read(self, given: Dict[str, Any]) -> AmclParams:
         params, faults = read_params(given)
         for fault in faults:
             self._warn(fault)
         return params
-
-    def _warn(self, text: str) -> None:
-        self._warnings.warn(f"{self.name}: {text}")
 
     # Maps.
 
@@ -169,22 +147,25 @@ class AmclRobot:
             self._warn(f"the map is in frame '{excerpt(frame)}', expected '{wanted}'; using it")
         cells = np.array(message.data, np.int8).reshape(info.height, info.width)
         grid = OccupancyMap.from_occupancy(cells, info.resolution, *place, self.params.upstream)
-        given = rospy.get_param(self._names("~"), {})
-        one = self._read(given)
-        pose = Pose2D(one.initial_pose_x_m, one.initial_pose_y_m, one.initial_pose_a_rad)
-        if "initial_pose_x" not in given:  # neither a launch file nor `save_pose` has set it
-            start = rospy.get_param(f"{_STARTS}/quad{self.robot}", None)
-            pose = Pose2D(*start) if start else pose
-        variances = (one.initial_cov_xx, one.initial_cov_yy, one.initial_cov_aa)
+        start = self._initial_pose()
         with self._lock:
-            start = PoseEstimate(pose, np.diag(variances))
             self._start = self._start or start
+            waiting = None if self._amcl.has_map else self._last
             self._amcl.set_map(grid, start)
-            waiting, self._waiting = self._waiting, None
         rospy.loginfo("%s: map of %d x %d cells", self.name, info.width, info.height)
         if waiting is not None:
             self.localise(*waiting)
         return True
+
+    def _initial_pose(self) -> PoseEstimate:
+        """Return where the parameters say that it is; without them where the scene starts it."""
+        given = rospy.get_param(self._names("~"), {})
+        params = self._read(given)
+        row = params.initial_pose_x_m, params.initial_pose_y_m, params.initial_pose_a_rad
+        if "initial_pose_x" not in given:  # neither a launch file nor `save_pose` has set it
+            row = rospy.get_param(f"{_STARTS}/quad{self.robot}", None) or row
+        variances = params.initial_cov_xx, params.initial_cov_yy, params.initial_cov_aa
+        return PoseEstimate(Pose2D(*row), np.diag(variances))
 
     def _on_set_map(self, request: SetMapRequest) -> SetMapResponse:
         with self._lock:
@@ -273,34 +254,27 @@ class AmclRobot:
     def localise(self, stamp: rospy.Time, seen: Observation) -> None:
         """Take a scan and publish what it tells; without a map it waits for the map."""
         with self._lock:
-            self._seen_s, self._odom_from_base = stamp.to_sec(), seen.odom_from_base
-            update, params = self._amcl.update(seen), self.params
-            is_lost, particles = self._amcl.is_lost, self._amcl.particles
-            transform = self._amcl.map_from_odom
-            if particles is None:
-                self._waiting = stamp, seen
+            self._last = stamp, seen
+            if not self._amcl.has_map:
                 self._warn("no map yet: no transform until there is one")
-            if particles is None or update is None:
+            update, params = self._amcl.update(seen), self.params
+            is_lost, transform = self._amcl.is_lost, self._amcl.map_from_odom
+            if update is None:
                 return
             poses = self._amcl.cloud.copy() if update.shows_cloud else None
+        frame, found = params.global_frame_id, update.estimate
         if poses is not None:
-            frame = params.global_frame_id
             self._cloud.publish(pose_array_message(poses, rospy.get_time(), frame))
-        if update.estimate is not None:
-            estimate = update.estimate
-            covariance = covariance_36(estimate.covariance).tolist()
-            pose = PoseWithCovariance(pose_message(estimate.pose.to_3d()), covariance)
-            header = Header(0, stamp, params.global_frame_id)
-            self._pose.publish(PoseWithCovarianceStamped(header, pose))
+        if found is not None:
+            self._pose.publish(pose_estimate_message(found.pose, found.covariance, frame, stamp))
         if transform is None:
             return
         if params.tf_broadcast and not is_lost:  # without it the navigator stops
-            frames = params.global_frame_id, params.odom_frame_id
             until = stamp + rospy.Duration(params.transform_tolerance_s)
-            self._send(transform_message(transform, *frames, until))
+            self._send(transform_message(transform, frame, params.odom_frame_id, until))
         rate_hz, now_s = params.save_pose_rate_hz, rospy.get_time()
-        is_due = rate_hz > 0.0 and not is_lost and now_s - self._saved_s >= 1.0 / rate_hz
-        if update.estimate is None and is_due and not self._saver.is_alive():
+        is_due = rate_hz > 0.0 and not is_lost and abs(now_s - self._saved_s) >= 1.0 / rate_hz
+        if found is None and is_due and not self._saver.is_alive():
             self._saved_s = now_s
             self._saver = threading.Thread(target=self.save_pose, daemon=True)
             self._saver.start()  # the ROS master may hang
@@ -308,11 +282,12 @@ class AmclRobot:
     def save_pose(self) -> None:
         """Store the present pose as the parameters of the initial one."""
         with self._lock:
-            transform, odometry = self._amcl.map_from_odom, self._odom_from_base
-            estimate = self._amcl.estimate
-        if transform is None or odometry is None or estimate is None:
+            transform, estimate = self._amcl.map_from_odom, self._amcl.estimate
+            last = self._last
+        if transform is None or estimate is None or last is None:
             return
-        pose, variances = transform.compose(odometry), np.diag(estimate.covariance).tolist()
+        pose = transform.compose(last[1].odom_from_base)
+        variances = np.diag(estimate.covariance).tolist()
         values = (pose.x_m, pose.y_m, tilted_yaw(pose.quaternion), *variances)
         for name, value in zip(
             ("pose_x", "pose_y", "pose_a", "cov_xx", "cov_yy", "cov_aa"), values
@@ -325,7 +300,7 @@ class AmclRobot:
         level, message = Level.OK, "OK"
         values = {}
         search, fit = self._amcl.search, self._amcl.fit
-        if search is None:
+        if not self._amcl.has_map:
             level, message = Level.ERROR, "no map"
         elif self._amcl.is_lost:
             level, message = Level.ERROR, "lost"
@@ -333,7 +308,7 @@ class AmclRobot:
                 message += (
                     ": other places fit as well" if search.is_ambiguous else ": no place fits"
                 )
-        elif self._seen_s is None or rospy.get_time() - self._seen_s > SILENT_S:
+        elif self._last is None or rospy.get_time() - self._last[0].to_sec() > SILENT_S:
             level, message = Level.WARN, "no scans with odometry"
         elif estimate is None:
             level, message = Level.WARN, "no pose"

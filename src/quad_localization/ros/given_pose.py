@@ -8,7 +8,6 @@ import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from numpy.typing import NDArray
 
-from quad_localization.localizer import is_covariance
 from quad_nav.errors import excerpt
 from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.conversions import pose_from_message
@@ -30,8 +29,16 @@ def given_pose(
     problem = pose_problem(pose)
     if frame not in ("", wanted):
         problem = f"frame '{excerpt(frame)}', expected '{wanted}'"
-    elif not is_covariance(covariance):
+    elif not _is_covariance(covariance):
         problem = "the covariance is not positive semidefinite"
     if problem:
         raise ValueError(problem)
     return pose, covariance
+
+
+def _is_covariance(matrix: NDArray[np.float64]) -> bool:
+    """Tell whether float64[3, 3] is finite and, rounding apart, positive semidefinite."""
+    if not np.all(np.isfinite(matrix)):
+        return False
+    values = np.linalg.eigvalsh(0.5 * (matrix + matrix.T))
+    return bool(values[0] >= -1e-9 * max(1.0, abs(float(values[-1]))))

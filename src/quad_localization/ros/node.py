@@ -67,7 +67,6 @@ class AmclNode:
             if now_s < before_s:
                 self._warn("the clock jumped back: waiting scans dropped")
                 self._scans.clear()
-                self.robot.restart()
             before_s = now_s
             self.step(now_s)
             time.sleep(_POLL_S)

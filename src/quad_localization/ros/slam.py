@@ -12,10 +12,9 @@ from typing import Deque, Dict, List, Optional
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import PoseWithCovariance, PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan
-from std_msgs.msg import Header
 
 from quad_localization.ros.amcl_robot import SILENT_S
 from quad_localization.ros.given_pose import given_pose
@@ -26,10 +25,10 @@ from quad_localization.warm_up import warm_up_slam
 from quad_nav.errors import excerpt
 from quad_nav.files.kernel_cache import COMPILING, announced
 from quad_nav.files.values import is_number, is_whole
-from quad_nav.geometry import Pose2D, covariance_36
+from quad_nav.geometry import Pose2D
 from quad_nav.ros.common.conversions import (
     ScanMessage,
-    pose_message,
+    pose_estimate_message,
     scan_from_message,
     transform_message,
 )
@@ -175,10 +174,8 @@ class SlamNode:
         frame = transform_message(place.map_from_odom.to_3d(), "map", robot.odom, ahead)
         self._tf.send(frame)
         if place.odom_from_base is not None:
-            here = place.map_from_odom.compose(place.odom_from_base).to_3d()
-            covariance = covariance_36(place.covariance).tolist()
-            pose = PoseWithCovariance(pose_message(here), covariance)
-            robot.publisher.publish(PoseWithCovarianceStamped(Header(0, stamp, "map"), pose))
+            here = place.map_from_odom.compose(place.odom_from_base)
+            robot.publisher.publish(pose_estimate_message(here, place.covariance, "map", stamp))
 
     def _set_pose(self, robot: SlamRobot) -> None:
         """Take the pose that a person gave, when there was a scan."""

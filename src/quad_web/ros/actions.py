@@ -10,16 +10,15 @@ from typing import Any, Dict, List, Mapping, Optional
 
 import rospy
 from actionlib_msgs.msg import GoalID
-from geometry_msgs.msg import PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import Header
 from std_srvs.srv import Empty, SetBool, SetBoolRequest, Trigger
 
-from quad_nav.geometry import Pose2D, covariance_36
+from quad_nav.geometry import Pose2D
 from quad_nav.mission.goal import goal_faults
 from quad_nav.mission.place_check import PlaceCheck
 from quad_nav.mission.robot_goals import goal_paths
-from quad_nav.ros.common.conversions import pose_message
+from quad_nav.ros.common.conversions import pose_estimate_message
 from quad_nav.ros.common.nav_messages import planar_pose, pose_stamped
 from quad_nav.ros.sequencer.mission_stop import RESUME_SERVICE, STOP_SERVICE, STOPPED_PARAMETER
 from quad_nav.scenario.goal_checks import place_check
@@ -213,9 +212,8 @@ class FlightActions(GoalEditing):
             self._poses[robot] = rospy.Publisher(topic, PoseWithCovarianceStamped, queue_size=1)
         if not _is_heard(self._poses[robot]):
             return Answer(False, f"quad{robot}: no node subscribes to {topic}; expected amcl, slam")
-        covariance = covariance_36(GIVEN_COVARIANCE).tolist()
-        given = PoseWithCovariance(pose_message(pose.to_3d()), covariance)
-        self._poses[robot].publish(PoseWithCovarianceStamped(Header(0, _now(), "map"), given))
+        given = pose_estimate_message(pose, GIVEN_COVARIANCE, "map", _now())
+        self._poses[robot].publish(given)
         return Answer(True, f"quad{robot}: {given_text(pose)}")
 
     def set_uniform(self, robot: int) -> Answer:

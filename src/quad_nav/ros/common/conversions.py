@@ -12,6 +12,7 @@ from geometry_msgs.msg import (
     Point,
     Pose,
     PoseWithCovariance,
+    PoseWithCovarianceStamped,
     Quaternion,
     Transform,
     TransformStamped,
@@ -20,11 +21,12 @@ from geometry_msgs.msg import (
     Vector3,
 )
 from nav_msgs.msg import Odometry
+from numpy.typing import NDArray
 from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 
-from quad_nav.geometry import Pose3D, Scan, Twist2D
+from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, covariance_36
 
 _NO_COVARIANCE = [0.0] * 36
 _NO_INTENSITIES = np.empty(0, dtype=np.float32)
@@ -57,6 +59,14 @@ def twist_from_message(message: Twist) -> Twist2D:
 def pose_message(pose: Pose3D) -> Pose:
     """Convert a pose."""
     return Pose(Point(pose.x_m, pose.y_m, pose.z_m), Quaternion(*pose.quaternion))
+
+
+def pose_estimate_message(
+    pose: Pose2D, covariance: NDArray[np.float64], frame: str, stamp: rospy.Time
+) -> PoseWithCovarianceStamped:
+    """Convert a pose in a frame, with its covariance float64[3, 3] of x, y and yaw."""
+    found = PoseWithCovariance(pose_message(pose.to_3d()), covariance_36(covariance).tolist())
+    return PoseWithCovarianceStamped(Header(0, stamp, frame), found)
 
 
 def pose_from_message(message: Pose) -> Pose3D:
