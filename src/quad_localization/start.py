@@ -2,8 +2,8 @@
 
     run_module quad_localization.start --scene arena.yaml --robots 2
 
-The options are those of the simulator, which chooses the same starts. A scene with faults has no
-poses here: the simulator tells the faults.
+The options are those of the simulator, which chooses the same starts. With faults in the scene or
+in an option there are no poses here: the simulator tells the faults.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ from typing import List, Optional, Sequence
 import yaml
 
 from quad_nav.errors import InputError, printable
+from quad_nav.files.values import value_faults
 from quad_nav.geometry import Pose2D
+from quad_nav.scenario.rules import RULES
 from quad_nav.scenario.scenario import scene_of
 
 
@@ -30,8 +32,10 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("--size", type=float, default=0.0, help="side of a random scene, m")
     given = parser.parse_args(arguments)
     starts: Sequence[Pose2D] = ()
-    with contextlib.suppress(InputError):
-        starts = scene_of(vars(given)).starts
+    rules = {name: RULES[name] for name in ("robots", "seed", "size")}
+    if not value_faults(vars(given), rules, ""):
+        with contextlib.suppress(InputError):
+            starts = scene_of(vars(given)).starts
     rows = {f"quad{k}": [one.x_m, one.y_m, one.yaw_rad] for k, one in enumerate(starts)}
     print(printable(yaml.safe_dump(rows), "\n"))
     return 0

@@ -37,6 +37,11 @@ faults = FLY["argument_faults"]
         ),
         ("vehicles.launch", "vehicle:=x.yaml", "; did you mean vehicles:=?"),
         ("fleet.launch", "folder:=x", "; expected name:=value"),
+        (
+            "two_quads.launch",
+            "fleet.launch",
+            '; the launch file is the first one: make fly ARGS="fleet.launch ..."',
+        ),
     ],
 )
 def test_an_argument_that_the_launch_file_lacks_is_refused(launch_file, argument, hint):

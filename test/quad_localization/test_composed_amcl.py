@@ -1,4 +1,4 @@
-"""Faults of amcl in the simulator's process: the robot has no place, or a message is refused."""
+"""Faults of amcl: the robot has no place, a message is refused, or an argument."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ros.fake_ros import FakeRos, deliver  # noqa: E402
 from test_slam import Ways  # noqa: E402
 
 from quad_localization.map_files import CELL_M  # noqa: E402
-from quad_localization.ros import composed  # noqa: E402
+from quad_localization.ros import composed, node  # noqa: E402
 from quad_nav.config import load  # noqa: E402
 from quad_nav.files.document import read_yaml  # noqa: E402
 from quad_nav.files.shipped import shipped  # noqa: E402
@@ -134,3 +134,10 @@ def test_ranges_of_nan_leave_the_place_to_odometry(flight):
     flight.fly(1.0, ranges_m=np.full(512, np.nan, np.float32))
     flight.fly(1.0)
     flight.assert_right()
+
+
+def test_amcl_refuses_a_bag_and_not_what_roslaunch_adds(monkeypatch, capsys):
+    arguments = ["amcl", "--run-from-bag", "flight.bag", "__name:=amcl0", "_seed:=1"]
+    monkeypatch.setattr("sys.argv", arguments)
+    assert node.main() == 2
+    assert "amcl: --run-from-bag flight.bag: expected no argument" in capsys.readouterr().err

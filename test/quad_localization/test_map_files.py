@@ -85,8 +85,14 @@ def test_amcl_begins_where_the_simulator_starts(capsys):
     expected = random_mission(3, 7, 14.0).scene.starts
     found = yaml.safe_load(capsys.readouterr().out)
     assert [Pose2D(*found[f"quad{k}"]) for k in range(3)] == list(expected)
-    assert start.main(["--scene", "no file", *options]) == 0
-    assert yaml.safe_load(capsys.readouterr().out) == {}, "the simulator tells the fault"
+
+
+@pytest.mark.parametrize(
+    "faulty", [["--scene", "no file"], ["--robots", "-3"], ["--seed", "-1"], ["--size", "nan"]]
+)
+def test_amcl_has_no_start_where_the_simulator_tells_a_fault(faulty, capsys):
+    assert start.main(["--scene", "random", "--robots", "3", *faulty]) == 0
+    assert yaml.safe_load(capsys.readouterr().out) == {}
 
 
 def test_map_server_draws_the_random_mission_s_scene():

@@ -5,6 +5,7 @@ Callbacks store scans; the main thread hands them over when tf knows where the r
 
 from __future__ import annotations
 
+import sys
 import time
 from collections import deque
 from typing import Deque, List, Optional
@@ -19,6 +20,7 @@ from quad_localization.ros.peers import PeerPlaces
 from quad_localization.ros.reset_watch import ResetWatch
 from quad_localization.ros.transform_topic import TransformTopic
 from quad_localization.warm_up import warm_up_amcl
+from quad_nav.errors import printable
 from quad_nav.files.kernel_cache import COMPILING, announced
 from quad_nav.ros.common.conversions import scan_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings, publish_health
@@ -26,6 +28,7 @@ from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.topics.validation import scan_problem, stamp_problem
 
+EXIT_BAD_INPUT = 2
 _QUEUE = 100
 _POLL_S = 0.01  # wall time: how late a transform is noticed
 
@@ -112,7 +115,12 @@ class AmclNode:
 
 
 def main() -> int:
-    """Run the node; return 0 after a shutdown."""
+    """Run the node; return 0 after a shutdown, 2 for an argument."""
+    arguments = rospy.myargv(sys.argv)[1:]
+    if arguments:
+        text = f"amcl: {' '.join(arguments)}: expected no argument; for a bag use rosbag play"
+        print(printable(text), file=sys.stderr)
+        return EXIT_BAD_INPUT
     nodes: List[AmclNode] = []
 
     def save() -> None:

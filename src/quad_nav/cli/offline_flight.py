@@ -34,7 +34,7 @@ from quad_nav.scenario.rules import RULES, SIMULATOR
 from quad_nav.sim.flight import AIRFRAMES
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.localization import LocalizationMaker
-from quad_nav.sim.odometry import OdometryErrors
+from quad_nav.sim.odometry import ERROR_NAMES, MAX_ERROR, OdometryErrors
 from quad_nav.sim.simulation_params import SimulationParams
 
 _TUTORIAL_ROBOTS = 2
@@ -163,7 +163,13 @@ def _odometry_errors(text: str) -> OdometryErrors:
     with contextlib.suppress(yaml.YAMLError):
         values = plain_yaml.load("{" + text.replace("=", ": ") + "}")
     if not rule.accepts(values):
-        raise InputError([f"--odom-drift {text}: expected {rule.expected}, with = for :"])
+        names = ", ".join(f"{name}=" for name in ERROR_NAMES)
+        raise InputError(
+            [
+                f"--odom-drift {text}: expected any of {names} each with a number from 0 to"
+                f" {MAX_ERROR:g}, such as per_m=0.05,per_rad=0.05"
+            ]
+        )
     return OdometryErrors.of(values)
 
 

@@ -151,7 +151,7 @@ const ENTRIES = [
   ["Local plan", path("localPlans"), has("localPlans")],
   ["LIDAR points", scan, has("scans")],
   ["Voronoi cell", cell, has("cells")],
-  ["Believed pose: within with 95 %; particles", localization, has("localizations")],
+  ["Believed pose; 95 % region; particles", localization, has("localizations")],
   ["Tracked obstacle; the line ends where it is in 1 s", track("seen"), isTrack("seen")],
   ["Tracked, but hidden: predicted", track("hidden"), isTrack("hidden")],
   ["Suspect: may move", track("suspect"), isTrack("suspect")],

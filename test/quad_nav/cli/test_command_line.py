@@ -75,6 +75,10 @@ def test_help_has_groups_an_example_and_every_configuration():
         ("circle --radius abc", "'abc' is not a valid number."),
         ("fly --report x.txt", "flight not started, invalid input:\n  --report: x.txt: expected a"),
         ("report nope.bag -o x.txt", "--output: x.txt: expected a name that ends in .html or .htm"),
+        (
+            "fly --odom-drift perm=1",
+            "perm=1: expected any of per_m=, per_rad=, speed=, turn=, slip= ",
+        ),
         ("sweep", "sweep not started, invalid input:\n  expected --over"),
         ("preview -o x.txt", "preview not made, invalid input:\n  --output: x.txt: expected a"),
         ("check defalt", "config: defalt: expected a folder, a YAML file, a launch file, or the"),
