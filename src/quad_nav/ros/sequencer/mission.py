@@ -384,7 +384,7 @@ def _robot_needs(robot: MissionRobot, feed: StateFeed) -> List[Need]:
         try:
             robot.odometry.map_from(link.pose_frame)
         except TransformUnavailable as error:
-            return f"/tf: {error}"
+            return f"/tf: {robot.name}: no map -> {link.pose_frame} yet: {error}"
         return ""
 
     return [
