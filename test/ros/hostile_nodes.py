@@ -27,6 +27,7 @@ from quad_nav.ros.sequencer.mission import MissionRunner
 from quad_nav.ros.simulator.node import SimulatorNode
 from quad_nav.scenario import mission_setup, simulator_setup
 from quad_nav.sim.contacts import Contact
+from quad_nav.topics.estimates import TRUTH_TOPIC
 
 SCENE = str(ROOT / "scenes" / "arena.yaml")
 
@@ -123,6 +124,7 @@ class SequencerNode:
             "/simulation/contacts": self._contact,
             "/simulation/last_reset": lambda: Time(rospy.Time.from_sec(0.5)),
             STATES_TOPIC: partial(Navigators._states, self),
+            TRUTH_TOPIC: partial(Navigators._states, self),
             "/tf": partial(Navigators._transforms, self),
             "/tf_static": partial(Navigators._static_transforms, self),
         }

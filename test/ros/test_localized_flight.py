@@ -57,7 +57,7 @@ class LocalizedFlight(FlightCase):
 
     def check_page(self, name, poses):
         """The page shows the result and who is where, and takes a pose for a robot that hovers."""
-        state, here = FleetState(), pose_from_message(poses.messages[-1].pose.pose).to_2d()
+        state = FleetState()
         state.add_client(Wanted(frozenset(LAYERS), 0))
         source = FlightSource(state, 2, "test")
         actions = FlightActions(source, 2, Path("/nonexistent"))
@@ -71,8 +71,8 @@ class LocalizedFlight(FlightCase):
         self.assertEqual(state.item("result").data["reached"], 6)
         self.wait(lambda: state.item("localization/0"), "where robot 0 believes itself")
         self.wait(lambda: state.item("status").data["rows"][0]["localization"], "its figures")
-        count = len(poses.messages)
-        answer = actions.call("set_pose", 0, here)
+        count, last = len(poses.messages), poses.messages[-1]  # of the robot at rest
+        answer = actions.call("set_pose", 0, pose_from_message(last.pose.pose).to_2d())
         self.assertTrue(answer.ok, answer.text)
         self.wait(lambda: len(poses.messages) > count, "a pose after that of a person")
 
