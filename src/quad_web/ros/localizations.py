@@ -39,6 +39,7 @@ class Localizations:
         self._clouds: Dict[str, Newest] = {}
         self._true = TrueStates()
         self._last: Dict[int, Located] = {}
+        self._to_compare: Dict[int, float] = {}  # stamps of poses whose truth has not come
         self._shown: Dict[int, Tuple[Located, bool]] = {}  # the last items: of what, and lost
         self._warnings = ThrottledWarnings()
 
@@ -69,6 +70,7 @@ class Localizations:
                 self._read(topic, newest)
             except ValueError as error:
                 self._warnings.warn(f"web: {topic}: message dropped: {error}", topic)
+        self._compare()
         items = []
         for robot in shown:
             located = self.located(robot)
@@ -109,9 +111,16 @@ class Localizations:
         if problem:
             raise ValueError(problem)
         covariance = planar_covariance(message.pose.covariance)
-        true = self._true.find(robot, message.header.stamp.to_sec())
-        truth = None if true is None else Pose2D(*true.tolist())
-        self._last[robot] = replace(last, pose=pose.to_2d(), covariance=covariance, truth=truth)
+        self._last[robot] = replace(last, pose=pose.to_2d(), covariance=covariance, truth=None)
+        self._to_compare[robot] = message.header.stamp.to_sec()
+
+    def _compare(self) -> None:
+        """Find the true poses; they come later than the estimates, or before."""
+        for robot, stamp_s in list(self._to_compare.items()):
+            true = self._true.find(robot, stamp_s)
+            if true is not None:
+                self._last[robot] = replace(self._last[robot], truth=Pose2D(*true.tolist()))
+                del self._to_compare[robot]
 
 
 def cloud_places(data: bytes) -> NDArray[np.float64]:
