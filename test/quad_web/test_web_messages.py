@@ -204,6 +204,11 @@ def test_the_error_is_the_distance_from_where_the_robot_was_at_the_stamp():
         row = localizations.located(0).row()
         error = (row.get("error_m"), row.get("error_rad"))
         assert error == (pytest.approx((0.5, 0.1)) if stamp_s == 1.51 else (None, None))
+    row = [pose_row(Pose3D(2.3, 3.4, 1.0, quaternion_from_yaw(0.1)))]
+    late = States(1.6, "map", np.array([0]), np.array(row), np.zeros((1, 6)))
+    deliver(topics[TRUTH_TOPIC], states_message(late))
+    localizations.items(shown)
+    assert localizations.located(0).row()["error_m"] == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("cut", [0, 10, 20, 30, 90])
