@@ -105,7 +105,7 @@ class Amcl:
         self._random, self._spreads = seeded(seed), 0
         self._grid = OccupancyMap.from_occupancy(np.empty((0, 0), np.int8), 1.0, 0.0, 0.0)
         self._distances_m = np.empty((0, 0))  # of its cells to obstacles
-        self.search = PlaceSearch(self._grid, self._distances_m, self._random)
+        self.search = PlaceSearch(self._grid, self._random)
         self.particles = ParticleFilter(params, self._grid.free_places, self._random)
         self._lasers: Dict[str, Laser] = {}
         self._given: Optional[PoseEstimate] = None  # before the map
@@ -188,7 +188,7 @@ class Amcl:
         self._grid, self._lasers = grid, {}
         self._distances_m = obstacle_distances(grid, self.params.laser_likelihood_max_dist_m)
         was_searching = self.search.is_on
-        self.search = PlaceSearch(grid, self._distances_m, self._random)
+        self.search = PlaceSearch(grid, self._random)
         if was_searching:
             self.search.begin()
 

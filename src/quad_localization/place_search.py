@@ -15,7 +15,13 @@ from typing import List, Optional
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_localization.occupancy_map import MapFrame, OccupancyMap, cell_of, is_inside
+from quad_localization.occupancy_map import (
+    MapFrame,
+    OccupancyMap,
+    cell_of,
+    is_inside,
+    obstacle_distances,
+)
 from quad_localization.particle_filter import draw_poses
 from quad_localization.random_numbers import State, normals
 from quad_nav.files.kernel_cache import njit
@@ -28,6 +34,8 @@ _DRAWN = 4000
 _KEPT = 30
 _NEAR_M = 0.2
 """Beams that end nearer to an obstacle fit."""
+_FAR_M = 2.0
+"""Largest distance to an obstacle that is measured."""
 _COARSE_M, _FINE_M = 0.3, 0.1
 """Deviations of the ends of beams from obstacles, for random poses and for refined ones."""
 _REACHES = np.array([(0.15, 0.15, 0.08), (0.07, 0.07, 0.03), (0.03, 0.03, 0.015)])
@@ -51,10 +59,12 @@ class PlaceSearch:
         poses: float64[k, 3], the best pose of each place, the best place first.
     """
 
-    def __init__(self, grid: OccupancyMap, distances_m: Floats, state: State) -> None:
-        """Take a map, its cells' distances to obstacles, and the state of the random numbers."""
+    def __init__(self, grid: OccupancyMap, state: State) -> None:
+        """Take a map, and the state of the random numbers."""
         self._grid, self._state = grid, state
-        away_m = np.append(distances_m, math.inf)  # the last value is that outside the map
+        away_m = np.append(
+            obstacle_distances(grid, _FAR_M), math.inf
+        )  # the last value is that outside the map
         self._near = (away_m < _NEAR_M).astype(np.float64)
         self._coarse, self._fine = (
             np.exp(-0.5 * np.square(away_m / one)) for one in (_COARSE_M, _FINE_M)
@@ -103,7 +113,7 @@ class PlaceSearch:
 
     @property
     def is_complete(self) -> bool:
-        """Whether random poses have been all over the map."""
+        """Whether enough random poses were tried to find every place of the map."""
         area_m2 = len(self._grid.free_places) * self._grid.frame.resolution**2
         return self._drawn * _BASIN >= _COVERAGE * area_m2 * math.tau
 

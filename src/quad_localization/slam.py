@@ -198,7 +198,7 @@ class Slam:
         return found
 
     def _is_astray(self, place: SlamPose, prior: Floats) -> bool:
-        """Tell whether a robot whose scan is off the map is not just where nobody was before."""
+        """Tell whether a robot whose scan is off the map is lost: unsure, or far away."""
         is_unsure = np.trace(place.covariance[:2, :2]) > self._params.lost_above_m**2
         return bool(is_unsure or self.map.distance_m(prior[:2]) > _FAR_M)
 

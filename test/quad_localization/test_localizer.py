@@ -207,9 +207,9 @@ AT_ZERO = Pose2D(0.0, 0.0)
 ALL_OVER = 60  # scans, of 4,000 random poses each: more than a search of this room needs
 
 
-def carried_away(grid, is_begun):
+def carried_away(grid, is_begun, params=QUICK):
     """Return a robot that was carried by 3 m, or that was told a place 3 m off, after one scan."""
-    amcl = localizer(grid=grid)
+    amcl = localizer(params, grid=grid)
     if is_begun:
         amcl.update(seen(START, AT_ZERO, scan_from(START, grid=grid)))
         assert not amcl.is_lost
@@ -226,6 +226,11 @@ def test_a_robot_whose_scans_do_not_fit_is_lost_at_once_and_finds_its_place(is_b
     assert not amcl.is_lost and amcl.fit > 0.9
     assert amcl.estimate.pose.distance_to(CARRIED) < 0.1
     assert amcl.estimate.pose.yaw_rad == pytest.approx(CARRIED.yaw_rad, abs=0.05)
+
+
+def test_a_likelihood_field_of_few_centimetres_does_not_hide_that_a_robot_is_lost():
+    amcl = carried_away(ROOM, True, replace(QUICK, laser_likelihood_max_dist_m=0.1))
+    assert amcl.is_lost and amcl.fit < 0.5
 
 
 def test_a_search_of_the_whole_map_begins_anywhere():

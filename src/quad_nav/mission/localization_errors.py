@@ -1,4 +1,4 @@
-"""How far the poses that robots believe are from the true ones."""
+"""Errors of the poses that robots believe, against the true ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the robots are, of a simulation that leaves it to others to localize them."""
+"""True poses of robots that the simulator does not localize, from ``/quad/truth``."""
 
 from __future__ import annotations
 

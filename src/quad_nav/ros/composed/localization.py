@@ -1,4 +1,4 @@
-"""What the navigators of a composed fleet believe of their places, as tf tells it."""
+"""Places of a composed fleet's robots as tf tells them, which its navigators believe."""
 
 from __future__ import annotations
 
