@@ -71,15 +71,22 @@ class LocalizedFlight(FlightCase):
         self.assertEqual(state.item("result").data["reached"], 6)
         self.wait(lambda: state.item("localization/0"), "where robot 0 believes itself")
         self.wait(lambda: state.item("status").data["rows"][0]["localization"], "its figures")
-        count, last = len(poses.messages), poses.messages[-1]  # of the robot at rest
-        answer = actions.call("set_pose", 0, pose_from_message(last.pose.pose).to_2d())
-        self.assertTrue(answer.ok, answer.text)
-        self.wait(lambda: len(poses.messages) > count, "a pose after that of a person")
+        last = pose_from_message(poses.messages[-1].pose.pose).to_2d()  # of the robot at rest
 
         def error_m():
             return state.item("status").data["rows"][0]["localization"].get("error_m")
 
-        self.wait(lambda: error_m() is not None, "the error of that pose")
+        def has_error_after_a_pose():
+            """A busy machine may lose the one true pose that belongs to it: then another one."""
+            count = len(poses.messages)
+            answer = actions.call("set_pose", 0, last)
+            self.assertTrue(answer.ok, answer.text)
+            self.wait(lambda: len(poses.messages) > count, "a pose after that of a person")
+            end_s = rospy.get_time() + 5.0
+            self.wait(lambda: error_m() is not None or rospy.get_time() > end_s, "time")
+            return error_m() is not None
+
+        self.wait(has_error_after_a_pose, "the error of a pose")
         self.assertLess(error_m(), 0.2)
         if name != "amcl":
             return

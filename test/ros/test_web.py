@@ -204,6 +204,8 @@ class Web(FlightCase):
         self.assertIn("resumed", self.do("start"))
         self.wait(lambda: self.flight("state") == "running", "a flight")
         self.wait(lambda: min(self.speed(0), self.speed(1)) > 0.2, "both flying again")
+        self.do("stop_all")
+        self.assertIn("resumed", self.do("start"))  # before the diagnostics tell of a stop
         self.cancel_and_reset()
 
     def cancel_and_reset(self):

@@ -15,7 +15,7 @@ class ResetWatch:
     """Hears of resets since the first scan; a node that starts later hears of the last one, too."""
 
     def __init__(self) -> None:
-        self._begun_s, self._reset_s = math.inf, 0.0
+        self._begun_s, self._reset_s, self._now_s = math.inf, 0.0, 0.0
         self._subscriber = rospy.Subscriber(RESET_TOPIC, Time, self._on_reset, queue_size=1)
 
     def _on_reset(self, message: Time) -> None:
@@ -26,10 +26,14 @@ class ResetWatch:
         self._begun_s = min(self._begun_s, stamp_s)
 
     def pop(self, now_s: float) -> bool:
-        """Return whether there was a reset since the last call."""
-        if self._reset_s > now_s + MAX_LEAD_S:
+        """Return whether there was a reset since the last call.
+
+        On a busy machine a reset comes before `/clock` gets there: it waits.
+        """
+        if now_s < self._now_s:
             self._reset_s = 0.0  # of a clock that has jumped back
-        if self._reset_s <= self._begun_s:
+        self._now_s = now_s
+        if not self._begun_s < self._reset_s <= now_s + MAX_LEAD_S:
             return False
         self._begun_s = self._reset_s
         return True

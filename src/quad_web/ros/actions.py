@@ -71,10 +71,11 @@ class FlightActions(GoalEditing):
         if self._source.flight_state == "ended":
             return self.reset()
         texts = []
-        if self._source.health.has_simulator or not self._source.health.is_stopped:
+        is_stopped = self._source.is_stopped
+        if self._source.health.has_simulator or not is_stopped:
             texts.append(_triggered("/simulation/start"))
             self._source.expect(paused=False)
-        if self._source.health.is_stopped:
+        if is_stopped:
             texts.append(_triggered(RESUME_SERVICE))
             self._source.expect(stopped=False)
         return Answer(True, "; ".join(texts))

@@ -33,7 +33,7 @@ from quad_web.view.state import FleetState, Item, Wanted, robots_by_layer
 PERIOD_S = 0.05  # wall time, as the others; the stream sends half as often
 RESTING_S = 0.2  # without clients
 _LAYERS_EVERY, _ROWS_EVERY, _TOPICS_EVERY, _HEALTH_EVERY = 2, 5, 10, 20  # periods
-_EXPECTED_S = 1.5  # time until the diagnostics tell of a pause, a stop or a start
+_EXPECTED_S = 5.0  # longest time until the diagnostics tell of a pause, a stop or a start
 _SETTLES_S = 2.0  # time until a navigator tells of a goal that was sent
 _JUMP_S = 0.5
 
@@ -84,7 +84,10 @@ class FlightSource:
     def _is(self, name: str, told: bool) -> bool:
         """Return whether the flight is in a state; ``told`` is what the nodes say."""
         until_s, is_so = self._expected.get(name, (0.0, told))
-        return told if time.monotonic() > until_s else is_so
+        if told is is_so or time.monotonic() > until_s:
+            self._expected.pop(name, None)
+            return told
+        return is_so
 
     def show_goal(self, robot: int, goal: Optional[Pose2D]) -> None:
         """Show a goal that a person has sent; None removes it."""
@@ -285,6 +288,11 @@ class FlightSource:
             return math.nan
         x_m, y_m = self.bodies.positions[robot].tolist()
         return goal_distance_m(Pose2D(goal["x"], goal["y"]), Pose2D(x_m, y_m))
+
+    @property
+    def is_stopped(self) -> bool:
+        """True if a person has stopped a mission, here or elsewhere."""
+        return self._is("stopped", self.health.is_stopped)
 
     @property
     def flight_state(self) -> str:
