@@ -16,10 +16,15 @@ from xml.etree import ElementTree
 def failures(folder: Path) -> Iterator[tuple[str, str, str, str]]:
     """Yield (file, test, first line of the message, line of code) of each failed test."""
     for path in sorted(folder.rglob("*.xml")):
-        for case in ElementTree.parse(path).iter("testcase"):
+        try:
+            cases = list(ElementTree.parse(path).iter("testcase"))
+        except ElementTree.ParseError as error:  # of a test that was killed
+            yield path.stem, "all", f"no result: {error}", str(path)
+            continue
+        for case in cases:
             for fault in case.findall("failure") + case.findall("error"):
                 lines = (fault.text or fault.get("message") or "no message").strip().splitlines()
-                yield path.stem, case.get("name"), lines[0], lines[-1].strip()
+                yield path.stem, case.get("name"), lines[0][:300], lines[-1].strip()
 
 
 for file, test, message, code in failures(Path(sys.argv[1])):

@@ -56,6 +56,16 @@ def test_everything_printed_is_escaped():
     ] == []
 
 
+def test_results_of_rostests_do_not_overwrite_each_other():
+    names = [
+        (one.get("pkg"), one.get("test-name"))
+        for path in (ROOT / "test" / "ros").glob("*.test")
+        for one in ElementTree.parse(path).iter("test")
+    ]
+    assert len(names) > 30
+    assert sorted(name for name in set(names) if names.count(name) > 1) == []
+
+
 def unescaped_prints(path: Path, tree: ast.Module) -> Iterator[int]:
     """Yield lines that print to the terminal without ``errors.printable``."""
     for node in ast.walk(tree):

@@ -105,7 +105,7 @@ class LocalizedFlight(FlightCase):
 
             def has_begun_anew(record=record, count=count, start=start):
                 found = (pose_from_message(one.pose.pose) for one in record.messages[count:])
-                return any(pose.to_2d().distance_to(start) < 0.06 for pose in found)
+                return any(pose.to_2d().distance_to(start) < 0.3 for pose in found)
 
             self.wait(has_begun_anew, f"a robot at its start {start}")
 
