@@ -94,7 +94,11 @@ class WebBrowser(FlightCase):
         trigger("/mission/resume")
         self.wait(lambda: self.speed(0) > 0.2, "quad0 flying to its first goal again")
 
-    def test_3_stop_all_stops_all(self):
+    def test_3_a_flight_by_keyboard_alone(self):
+        self.driver.fly_by_keyboard()
+        self.wait(lambda: min(self.speed(0), self.speed(1)) > 0.2, "both flying again")
+
+    def test_4_stop_all_stops_all(self):
         self.driver.at("stop-all").click()
         self.driver.says("every quadcopter hovers")
         self.wait(lambda: max(self.speed(0), self.speed(1)) < 0.05, "both hovering")
@@ -102,7 +106,7 @@ class WebBrowser(FlightCase):
             row = self.driver.at(f"robots-row-{robot}")
             expect(row).to_contain_text("stopped")
 
-    def test_4_a_mission_that_has_ended_shows_its_result(self):
+    def test_5_a_mission_that_has_ended_shows_its_result(self):
         """The sequencer's flies in rounds: its summary is made up."""
         legs = tuple(Leg(k, 1, Goal(1.0, 2.0), True, "", 1, 70.0) for k in (0, 1))
         robot = RobotSummary("quad0", legs, 9.0, 0.41, 1.54)
@@ -121,14 +125,14 @@ class WebBrowser(FlightCase):
         expect(card).to_be_hidden()
         expect(self.driver.at("flight-state")).to_have_text("running")
 
-    def test_5_a_killed_node_is_noticed_and_the_page_comes_back(self):
+    def test_6_a_killed_node_is_noticed_and_the_page_comes_back(self):
         self.watch.forgive(GONE)
         self.restart_node()
         expect(self.driver.page.locator(NOTICE)).to_be_hidden()
         expect(self.driver.rows()).to_have_count(2)
         self.driver.is_ready()
 
-    def test_6_a_page_with_an_old_token_says_what_to_do(self):
+    def test_7_a_page_with_an_old_token_says_what_to_do(self):
         rospy.set_param("/web/steer_token", "the-second-to-steer")
         self.restart_node()
         notice = self.driver.page.locator(NOTICE)

@@ -64,6 +64,31 @@ class Driver:
                 return
         raise AssertionError(f"no {selector} within {_MOST_TABS} presses of Tab")
 
+    def fly_by_keyboard(self) -> None:
+        """Pause, start, select quad1, send it a goal, stop all and resume; the focus is seen."""
+        state, press = self.at("flight-state"), self.page.keyboard.press
+        for expected in ("paused", "running"):
+            self.tab_to("[data-testid=play]")
+            press("Enter")
+            expect(state).to_have_text(expected)
+        self.tab_to("[data-testid=robots-row-0]")
+        press("ArrowDown")
+        press("Enter")
+        expect(self.at("card-name")).to_have_text("quad1")
+        self.tab_to("[data-testid=goal-x]")
+        self.page.keyboard.type("8")
+        self.tab_to("[data-testid=goal-y]")
+        self.page.keyboard.type("1.5")
+        press("Enter")
+        self.says("(8.00, 1.50)")
+        self.tab_to("[data-testid=goal-send]")
+        press(".")
+        expect(state).to_have_text("stopped")
+        self.tab_to("[data-testid=play]")
+        press("Enter")
+        expect(state).to_have_text("running")
+        expect(self.at("robots-row-1")).not_to_contain_text("stopped")
+
     def pixel(self, x_m: float, y_m: float) -> Tuple[float, float]:
         """Return where on the page a point of the arena is."""
         return tuple(

@@ -33,7 +33,7 @@ from quad_web.view.state import FleetState, Item, Wanted, robots_by_layer
 PERIOD_S = 0.05  # wall time, as the others; the stream sends half as often
 RESTING_S = 0.2  # without clients
 _LAYERS_EVERY, _ROWS_EVERY, _TOPICS_EVERY, _HEALTH_EVERY = 2, 5, 10, 20  # periods
-_EXPECTED_S = 5.0  # longest time until the diagnostics tell of a pause, a stop or a start
+_TOLD_S, _EXPECTED_S = 1.5, 5.0  # until diagnostics tell of a pause, a stop or a start; longest
 _SETTLES_S = 2.0  # time until a navigator tells of a goal that was sent
 _JUMP_S = 0.5
 
@@ -68,7 +68,7 @@ class FlightSource:
         self._seen: Dict[str, Any] = {}  # data of items that seldom change, by key
         self._passing: FrozenSet[str] = frozenset()  # keys of items that disappear
         self._sent: Dict[int, Tuple[float, Pose2D]] = {}  # goals that people have sent
-        self._expected: Dict[str, Tuple[float, bool]] = {}  # until when, whether it is so
+        self._expected: Dict[str, Tuple[float, bool]] = {}  # since when, whether it is so
         self._wanted: Sequence[Wanted] = ()
         self._count, self._resets, self._stamp_s, self._version = 0, 0, 0.0, -1
 
@@ -78,13 +78,14 @@ class FlightSource:
 
     def expect(self, **states: bool) -> None:
         """Show that the flight is ``paused`` or ``stopped``, or not, before the nodes tell so."""
-        until_s = time.monotonic() + _EXPECTED_S
-        self._expected.update({name: (until_s, is_so) for name, is_so in states.items()})
+        now_s = time.monotonic()
+        self._expected.update({name: (now_s, is_so) for name, is_so in states.items()})
 
     def _is(self, name: str, told: bool) -> bool:
         """Return whether the flight is in a state; ``told`` is what the nodes say."""
-        until_s, is_so = self._expected.get(name, (0.0, told))
-        if told is is_so or time.monotonic() > until_s:
+        since_s, is_so = self._expected.get(name, (-math.inf, told))
+        patience_s = _TOLD_S if told is is_so else _EXPECTED_S
+        if time.monotonic() - since_s > patience_s:
             self._expected.pop(name, None)
             return told
         return is_so
