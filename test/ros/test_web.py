@@ -190,6 +190,8 @@ class Web(FlightCase):
 
     def test_5_stop_all_send_a_goal_and_resume(self):
         self.wait(lambda: min(self.speed(0), self.speed(1)) > 0.2, "both flying")
+        self.do("stop_all")
+        self.assertIn("resumed", self.do("start"))  # before the diagnostics tell of a stop
         self.assertIn("every quadcopter hovers", self.do("stop_all"))
         self.wait(lambda: max(self.speed(0), self.speed(1)) < 0.05, "both hovering")
         self.wait(lambda: self.flight("state") == "stopped", "a stopped flight")
@@ -204,8 +206,6 @@ class Web(FlightCase):
         self.assertIn("resumed", self.do("start"))
         self.wait(lambda: self.flight("state") == "running", "a flight")
         self.wait(lambda: min(self.speed(0), self.speed(1)) > 0.2, "both flying again")
-        self.do("stop_all")
-        self.assertIn("resumed", self.do("start"))  # before the diagnostics tell of a stop
         self.cancel_and_reset()
 
     def cancel_and_reset(self):
