@@ -130,7 +130,9 @@ class FlightBar:
         with ui.element("div").classes("time-line") as self._line:
             self._scrub = ui.slider(min=0.0, max=1.0, step=0.1, value=0.0)
             self._scrub.props("dense data-testid=scrub aria-label='time of the recording'")
-            self._scrub.on("update:model-value", self._drag, throttle=0.15)
+            # A trailing event would come after the thumb was let go, and hold the time line.
+            drag = "update:model-value"
+            self._scrub.on(drag, self._drag, throttle=0.15, trailing_events=False)
             self._scrub.on("change", self._drop)
             self._scrub_time = ui.label().classes("time").props("data-testid=scrub-time")
         self._line.set_visibility(not self._client.refusal("seek"))
@@ -179,7 +181,9 @@ class FlightBar:
     # -- what it does ----------------------------------------------------------------
 
     async def _toggle(self) -> None:
-        await self._client.call("pause" if self._shown.get("play") == "Pause" else "start")
+        name = "pause" if self._shown.get("play") == "Pause" else "start"
+        is_recording = not self._client.refusal("seek")  # its time line shows what came of it
+        await self._client.call(name, is_quiet=is_recording)
         self.refresh()
 
     async def _set_rate(self) -> None:

@@ -67,7 +67,9 @@ class ResultCard:
             ui.label(f"{result['hint']} writes a report").classes("muted")
         if not self._client.refusal("reset"):
             ui.space()
-            again = ui.button("Fly again", icon="restart_alt")
+            is_recording = not self._client.refusal("seek")
+            text = "Play again" if is_recording else "Fly again"
+            again = ui.button(text, icon="restart_alt")
             again.on_click(lambda: self._client.call("reset"))
             again.props("outline dense no-caps data-testid=result-again")
 

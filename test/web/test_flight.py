@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -58,6 +59,8 @@ def test_a_quadcopter_arrives_at_a_goal_that_was_clicked_and_stop_all_stops_it(
     flight.page.keyboard.press(".")
     expect(flight.at("flight-state")).to_have_text("stopped")
     expect(flight.at("robots-row-0")).to_contain_text("stopped")
+    flight.at("dock-events").click()  # opens at its end
+    expect(flight.at("events").get_by_text("missions stopped")).to_be_in_viewport()
 
 
 def test_a_flight_by_keyboard_alone(serve, open_page, goals, recording):
@@ -166,3 +169,4 @@ def test_a_recording_is_scrubbed(serve, open_page, recording):
     driver.page.mouse.click(line["x"] + 9, line["y"] + line["height"] / 2)
     driver.wait_for_arena(near(0, 1.5, 1.5))
     expect(driver.at("time")).to_have_text("0:00.0")
+    expect(driver.at("scrub-time")).to_have_text(re.compile("^0:00.0 / 0:"))  # it is let go

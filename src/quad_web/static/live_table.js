@@ -82,8 +82,18 @@ export default {
     },
   },
   mounted() {
+    this.body = this.$el.querySelector(".q-table__middle");
     if (!this.picks) {
-      this.$el.querySelector(".q-table__middle").tabIndex = 0; // arrows scroll it
+      this.body.tabIndex = 0; // arrows scroll it
+    }
+    if (this.follow) {
+      let height = 0;
+      new ResizeObserver(() => {
+        if (!height) {
+          this.toEnd(); // its tab is opened
+        }
+        height = this.body.clientHeight;
+      }).observe(this.body);
     }
   },
   methods: {
@@ -161,11 +171,11 @@ export default {
       }
     },
     isAtEnd() {
-      const body = this.$el?.querySelector?.(".q-table__middle");
+      const { body } = this;
       return !body || body.scrollHeight - body.scrollTop - body.clientHeight < END_PX;
     },
     toEnd() {
-      this.$nextTick(() => this.$refs.table.scrollTo(this.shown.length - 1, "end-force"));
+      this.$nextTick(() => this.body.scrollTo(0, this.body.scrollHeight));
     },
     rowClasses(row) {
       return { "is-selected": row.key === this.selected, "is-lost": row.lost === true };

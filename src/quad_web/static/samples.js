@@ -145,6 +145,7 @@ export function layoutOptions(width, height) {
       gridIndex: i,
       type: "value",
       min: ({ min }) => Math.min(0, min),
+      minInterval: 0.01, // robots at rest differ by less
       splitNumber: 3,
       axisLabel: text,
       axisLine: { show: false, onZero: false },
