@@ -6,7 +6,7 @@ from typing import Any, Dict, List, Optional, Sequence
 
 import numpy as np
 
-from quad_nav.report.distances import SHOWN_M, Curve, Panel
+from quad_nav.report.distances import Curve, Panel
 from quad_nav.report.marks import Hover, Marks
 from quad_nav.report.measures import speed_mps
 from quad_nav.report.paths import FlownPath, PathsMap
@@ -108,7 +108,7 @@ def distance_plot(
             f"{name} ({panel.unit})", domain=[1.0 - (row + 0.84) * height, top]
         )
         if panel.least is not None:
-            axes[f"yaxis{number}"]["range"] = [panel.bottom, SHOWN_M]
+            axes[f"yaxis{number}"]["range"] = panel.shown
         traces += _panel_traces(panel, names, f"y{number}", row == 0)
         shapes += _limits(panel, f"y{number}")
         titles.append(_title(panel.title, top))

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from hand_made_traces import TIMES_S, flight, robot
 
+from quad_nav.report.distances import distance_panels
 from quad_nav.report.encounter_picture import encounter_picture, frame_times
 from quad_nav.report.encounters import closest_moment, encounters, separation_text
-from quad_nav.report.matplotlib_figures import paths_picture
+from quad_nav.report.matplotlib_figures import distance_picture, paths_picture
 from quad_nav.report.measures import resampled_tracks
 from quad_nav.report.paths import flown_paths
 from quad_nav.report.style import styled
@@ -46,6 +47,9 @@ def test_a_flight_without_encounters_has_a_closest_moment():
     (left, right), *_ = [axes.get_xlim() for axes in encounter_picture(trace, tracks, one).axes]
     assert right - left == pytest.approx(2.4 + 6 * 0.3)  # both are inside
     assert closest_moment(flight(), resampled_tracks(flight())) == ()
+    far = passing(4.6)
+    panels = distance_panels(far, resampled_tracks(far))
+    assert distance_picture(panels, ("a", "b"), ()).axes[0].get_ylim()[1] > 4.0
 
 
 def test_what_repeats_soon_is_one_encounter():
