@@ -320,11 +320,12 @@ def _bars_trace(series: Bars) -> Json:
 
 
 def _goal_style(series: Bars) -> Json:
+    colours = [rgb(bar.number or 0, _PALE if bar.is_pale else 1.0) for bar in series.bars]
     return {
-        "color": [rgb(bar.number or 0, _PALE if bar.is_pale else 1.0) for bar in series.bars],
+        "color": colours,
         "line": {
             "color": ALARM if series.is_failure else PAPER,
             "width": 2 if series.is_failure else 1,
         },
-        "pattern": {"shape": "/" if series.is_hatched else "", "fgcolor": "#fff"},
+        "pattern": {"shape": "/" if series.is_hatched else "", "fgcolor": colours},
     }
