@@ -200,7 +200,7 @@ def _marks_trace(marks: Marks, scale: float = 1.0, axis_name: str = "y") -> Json
             "color": ["#fff" if full else colour for full in filled],
         }
         marker["size"] = round(marker["size"] * scale, 1)
-        marker["color"] = [colour if full else "#fff" for full in filled]
+        marker["color"] = [colour if full else PAPER for full in filled]
         marker["line"] = {"color": colour, "width": 2}
     return {
         "type": "scatter",

@@ -13,6 +13,7 @@ from report_pages import Parsed, assert_loads_nothing, figures_of
 
 from quad_nav.report.compared_flight import compared_flight, difference_rows, variants
 from quad_nav.report.comparison import comparison_page
+from quad_nav.report.plot import INK, PAPER
 from quad_nav.sim.contacts import Contact
 
 SLOW, FAST = {"controller_frequency": 5.0}, {"controller_frequency": 10.0}
@@ -121,6 +122,8 @@ def test_paths_are_in_one_plot():
     assert lines[1]["x"][-1] == 4.0 and lines[1]["customdata"][-1] == [5.0, 0.6]
     goals = next(one for one in figure["data"] if one.get("name") == "goal")
     assert (goals["text"], goals["x"]) == (["0.1"], [4.0])  # once, though all fly there
+    # Both colours change on a dark screen.
+    assert (goals["textfont"]["color"], goals["marker"]["color"]) == ([INK], [PAPER])
 
 
 @pytest.mark.filterwarnings("error")
