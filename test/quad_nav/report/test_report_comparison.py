@@ -70,6 +70,13 @@ def test_values_and_the_best_of_completed_flights():
     )
 
 
+def test_a_recording_that_is_not_complete_has_a_mark_of_its_own():
+    cut = replace(flights()[0], metrics=replace(flights()[0].metrics, covered_s=(0.0, 9.0)))
+    (legend,) = comparison_page([cut, *flights()[1:]]).pictures[1].draw().legends
+    names = [text.get_text() for text in legend.get_texts()]
+    assert names == ["mission completed", "mission failed", "mission not complete"]
+
+
 def test_only_what_differs_is_in_the_table():
     rows = difference_rows(flights(), variants(flights()))
     assert [(row.path, row.values, row.default) for row in rows] == [
