@@ -98,13 +98,16 @@ TURNED = replace(DONE, yaw_error_rad=-0.12)
             lambda: flight_page(cut(DONE, goal(1, (9.0, 1.0), 10.0))),
             [
                 '<span class="verdict unclear">Mission not complete</span>\n'
-                " recording covers 0.0 to 10.0 s; mission not complete</p>"
+                " recording covers 0.0 to 10.0 s</p>"
             ],
         ),
-        (lambda: flight_page(cut(DONE)), ["Mission not complete", "recording covers"]),
+        (
+            lambda: flight_page(cut(DONE)),
+            ["Mission not complete", "1 of 2</b>", "not recorded</td>"],
+        ),
         (
             lambda: flight_page(cut(goal(0, (9.0, 1.0), 0.0, 5.0, False, "no path"))),
-            ["Mission failed", "mission not complete; 1 of 1 goals not reached"],
+            ["Mission failed", "recording covers 0.0 to 10.0 s; 1 of 2 goals not reached"],
         ),
     ],
 )
