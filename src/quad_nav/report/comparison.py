@@ -31,6 +31,7 @@ _MARKS: Mapping[str, Dict[str, Any]] = {
     "completed": {"marker": "o", "ms": 5.5, "color": colour(0)},
     "failed": {"marker": "X", "ms": 7.5, "color": ALARM},
     "not complete": {"marker": "D", "ms": 5.0, "color": QUIET},
+    "unknown": {"marker": "s", "ms": 5.0, "color": QUIET},
 }
 """How flights are drawn, by their verdicts."""
 _PANELS = ("mission time", "detour", "recoveries", "min clearance", "min separation", "contacts")
@@ -59,7 +60,7 @@ class Column:
 
 COLUMNS: Tuple[Column, ...] = (
     Column("goals reached", "", 0, lambda flight: flight.reached, max, False),
-    Column("mission time", "s", 1, lambda flight: flight.mission_s),
+    Column("mission time", "s", 1, lambda flight: flight.mission_s if flight.goals else None),
     Column("path length", "m", 1, lambda flight: flight.path_length_m),
     Column("detour", "", 2, lambda flight: flight.detour),
     Column("min clearance", "m", 2, lambda flight: flight.min_clearance_m, max),

@@ -84,16 +84,18 @@ class FlightMetrics:
 
     @property
     def verdict(self) -> str:
-        """``completed``, ``failed`` or, as far as the recording tells, ``not complete``."""
+        """``completed``, ``failed``, ``unknown`` or, as far as is recorded, ``not complete``."""
         if self.faults:
             return "failed"
+        if not self.goals:
+            return "unknown"
         return "completed" if self.covered_s is None else "not complete"
 
     @property
     def remarks(self) -> Tuple[str, ...]:
         """Reasons for the verdict."""
         if self.covered_s is None:
-            return self.faults
+            return self.faults if self.goals else ("goals are not recorded", *self.faults)
         first_s, last_s = self.covered_s
         return (f"recording covers {first_s:.1f} to {last_s:.1f} s", *self.faults)
 
@@ -108,7 +110,7 @@ class FlightMetrics:
             found.append(f"{missed} of {self.goals} goals not reached")
         if self.contacts:
             found.append(f"{self.contacts} contact{'s' * (self.contacts > 1)}")
-        return tuple(found) if self.goals or self.covered_s else (*found, "no goal was sent")
+        return tuple(found)
 
     @property
     def detour(self) -> Optional[float]:

@@ -36,6 +36,8 @@ from quad_nav.report.robot_plots import (
 )
 from quad_nav.report.timeline import timeline
 
+_NOT_RECORDED = "Not recorded."
+
 
 def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page:
     """Build the report of one flight; ``wall_time_s`` is how long it took, if known."""
@@ -120,20 +122,26 @@ def _note(encounter: Encounter) -> str:
 def _curves(
     trace: FlightTrace, tracks: Tracks, flight: FlightMetrics, shown: Sequence[Encounter]
 ) -> List[Section]:
-    goals = timeline(trace)
     return [
         _distances(trace, tracks, shown),
-        Section(
-            "timeline",
-            "Timeline",
-            "A bar is a goal with its number, from sending it to its end.",
-            plots=(timeline_plot(goals),),
-            paper=(picture("timeline", "Goals over time", lambda: timeline_picture(goals)),),
-        ),
+        _timeline(trace),
         *_localization(trace, flight),
         _motion(trace, flight),
         _cycles(trace),
     ]
+
+
+def _timeline(trace: FlightTrace) -> Section:
+    content = timeline(trace)
+    if not content.series and not content.marks:
+        return Section("timeline", "Timeline", _NOT_RECORDED)
+    return Section(
+        "timeline",
+        "Timeline",
+        "A bar is a goal with its number, from sending it to its end.",
+        plots=(timeline_plot(content),),
+        paper=(picture("timeline", "Goals over time", lambda: timeline_picture(content)),),
+    )
 
 
 def _distances(trace: FlightTrace, tracks: Tracks, shown: Sequence[Encounter]) -> Section:
@@ -192,6 +200,8 @@ def _localization(trace: FlightTrace, flight: FlightMetrics) -> List[Section]:
 
 
 def _cycles(trace: FlightTrace) -> Section:
+    if not any(len(one.cycle_walls_s) or len(one.cycle_times_s) > 1 for one in trace.robots):
+        return Section("cycles", "Control cycles", _NOT_RECORDED)
     caption = (
         "A cycle that takes longer than the control period delays all navigators of its process."
         if has_wall_times(trace)
