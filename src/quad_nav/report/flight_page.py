@@ -148,12 +148,18 @@ def _distances(trace: FlightTrace, tracks: Tracks, shown: Sequence[Encounter]) -
     panels = distance_panels(trace, tracks, shown)
     names = [robot.name for robot in trace.robots]
     contacts_s = [contact.time_s for contact in trace.contacts]
+    marks = "Dashed lines are contacts."
+    if len(trace.robots) > 1:
+        marks = (
+            "Letters are the moments shown above, the dotted line is the limit of close "
+            f"encounters, {CLOSE_M:g} m, and dashed lines are contacts."
+        )
     return Section(
         "gaps",
         "Distances and speeds",
         "Separation is the distance between the hulls of two robots, clearance the distance from "
         f"a hull to the nearest obstacle or wall. Hulls are discs of {trace.robot_radius_m:.2f} m "
-        "radius; below zero they overlap. Letters are close encounters, dashed lines contacts.",
+        f"radius; below zero they overlap. {marks}",
         plots=(distance_plot([*panels, speed_panel(trace)], names, contacts_s),),
         paper=(
             picture(
