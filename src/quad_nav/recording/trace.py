@@ -121,6 +121,11 @@ class RobotTrace:
     covariances: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3, 3)))
 
     @property
+    def unsent(self) -> Tuple[Goal, ...]:
+        """Goals of the goal file after the last one that was sent."""
+        return self.mission[self.goals[-1].index + 1 if self.goals else 0 :]
+
+    @property
     def is_localized(self) -> bool:
         """True if the robot finds its place, as far as the trace tells."""
         return len(self.believed) > 0 or len(self.covariances) > 0
@@ -283,6 +288,7 @@ class TraceObserver(FlightObserver):
                     tuple(record.recoveries),
                     goal_traces(record.events),
                     known_parameters(robot.configuration.to_tree()),
+                    tuple(robot.sequencer.sequence.goals),
                     believed=believed[:, k],
                     covariances=uncertain[:, k],
                 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Callable, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,11 +22,18 @@ from quad_nav.report.matplotlib_figures import paths_picture
 from quad_nav.report.page import Page, Section, picture, render
 from quad_nav.report.paths import MOST_OVERLAID, overlaid_paths
 from quad_nav.report.plotly_figures import paths_plot
-from quad_nav.report.style import ALARM, colour, new_figure, robot_legend
+from quad_nav.report.style import ALARM, QUIET, colour, new_figure, robot_legend
 
 _MOST_NUMBERS = 6  # in the head of a column
 _BOX_FROM = 5  # flights; for fewer, the dots alone are clearer
 _COUNTS = ("recoveries", "contacts")
+_MARKS: Mapping[str, Dict[str, Any]] = {
+    "completed": {"marker": "o", "ms": 5.5, "color": colour(0)},
+    "failed": {"marker": "X", "ms": 7.5, "color": ALARM},
+    "not complete": {"marker": "D", "ms": 5.0, "color": QUIET},
+    "unknown": {"marker": "s", "ms": 5.0, "color": QUIET},
+}
+"""How flights are drawn, by their verdicts."""
 _PANELS = ("mission time", "detour", "recoveries", "min clearance", "min separation", "contacts")
 
 
@@ -53,7 +60,7 @@ class Column:
 
 COLUMNS: Tuple[Column, ...] = (
     Column("goals reached", "", 0, lambda flight: flight.reached, max, False),
-    Column("mission time", "s", 1, lambda flight: flight.mission_s),
+    Column("mission time", "s", 1, lambda flight: flight.mission_s if flight.goals else None),
     Column("path length", "m", 1, lambda flight: flight.path_length_m),
     Column("detour", "", 2, lambda flight: flight.detour),
     Column("min clearance", "m", 2, lambda flight: flight.min_clearance_m, max),
@@ -148,7 +155,7 @@ def _dots(metrics: Sequence[FlightMetrics]) -> Section:
     return Section(
         "comparison",
         "Side by side",
-        "A dot is a flight. Boxes span the middle half of five or more flights, with the median.",
+        "A mark is a flight. Boxes span the middle half of five or more flights, with the median.",
         (picture("comparison", "Metrics of each flight", lambda: _metrics_picture(metrics)),),
     )
 
@@ -162,7 +169,7 @@ def _grouped(flights: Sequence[FlightMetrics]) -> Dict[str, List[FlightMetrics]]
 
 
 def _metrics_picture(flights: Sequence[FlightMetrics]) -> Figure:
-    """Draw each flight as a dot, and failed flights as red crosses."""
+    """Draw a mark for each flight."""
     groups = _grouped(flights)
     figure = new_figure(5.2)
     panels = [column for title in _PANELS for column in COLUMNS if column.title == title]
@@ -181,9 +188,10 @@ def _metrics_picture(flights: Sequence[FlightMetrics]) -> Figure:
         if column.title in _COUNTS:
             axes.yaxis.get_major_locator().set_params(integer=True)
             axes.set_ylim(bottom=-0.3, top=max(axes.get_ylim()[1], 1.3))
-    good = Line2D([], [], ls="", marker="o", color=colour(0), label="successful flight")
-    bad = Line2D([], [], ls="", marker="X", ms=8, color=ALARM, mec="white", label="failed flight")
-    robot_legend(figure, (), [good, bad])
+    found = {flight.verdict for flight in flights}
+    shown = [verdict for verdict in _MARKS if verdict in found]
+    symbols = [Line2D([], [], ls="", label=f"mission {one}", **_MARKS[one]) for one in shown]
+    robot_legend(figure, (), symbols)
     return figure
 
 
@@ -206,14 +214,5 @@ def _draw_group(
     # Side by side in the order of the flights: equal values do not hide each other.
     places = column + (np.linspace(-0.2, 0.2, len(known)) if len(known) > 1 else np.zeros(1))
     for place, (flight, value) in zip(places, known):
-        axes.plot(
-            place,
-            value,
-            "o" if flight.success else "X",
-            ms=5.5 if flight.success else 7.5,
-            color=colour(0) if flight.success else ALARM,
-            mec="white",
-            mew=0.6,
-            alpha=0.9,
-            zorder=5,
-        )
+        mark = _MARKS[flight.verdict]
+        axes.plot(place, value, mec="white", mew=0.6, alpha=0.9, zorder=5, **mark)

@@ -13,10 +13,9 @@ from quad_nav.mission.distances import nearest_separations_m
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.encounters import CLOSE_M, Encounter
 from quad_nav.report.marks import Marks, encounter_marks
-from quad_nav.report.measures import Tracks, clearances_m, speed_mps
+from quad_nav.report.measures import Tracks, clearances_m, smallest, speed_mps
 
-SHOWN_M = 3.0
-"""Larger distances are cut off."""
+_SHOWN_M = 3.0  # larger distances are cut off, apart from the smallest one
 _FEW = 4  # more lines cannot be followed one by one
 
 
@@ -59,10 +58,10 @@ class Panel:
         return len(self.curves) > _FEW
 
     @property
-    def bottom(self) -> float:
-        """Lowest value that is shown of distances."""
-        known = np.zeros(0) if self.least is None else self.least.values
-        return min(-0.1, float(np.min(known[np.isfinite(known)], initial=0.0)) - 0.05)
+    def shown(self) -> List[float]:
+        """Range of distances that is shown; the smallest one is inside."""
+        least = 0.0 if self.least is None else smallest(self.least.values) or 0.0
+        return [min(-0.1, least - 0.05), max(_SHOWN_M, 1.25 * least)]
 
 
 def distance_panels(

@@ -32,7 +32,7 @@ class RobotMetrics:
     """Metrics of one robot; lengths and distances that were not measured are None."""
 
     name: str
-    sent: int
+    goals: int
     reached: int
     skipped: int
     path_length_m: float
@@ -68,9 +68,9 @@ class FlightMetrics:
     covered_s: Optional[Span] = None
 
     @property
-    def sent(self) -> int:
-        """Number of goals that were sent."""
-        return sum(robot.sent for robot in self.robots)
+    def goals(self) -> int:
+        """Number of goals that were sent, and of those of the goal files that were left."""
+        return sum(robot.goals for robot in self.robots)
 
     @property
     def reached(self) -> int:
@@ -84,34 +84,33 @@ class FlightMetrics:
 
     @property
     def verdict(self) -> str:
-        """``completed``, ``failed`` or, as far as the recording tells, ``not complete``."""
+        """``completed``, ``failed``, ``unknown`` or, as far as is recorded, ``not complete``."""
         if self.faults:
             return "failed"
+        if not self.goals:
+            return "unknown"
         return "completed" if self.covered_s is None else "not complete"
 
     @property
     def remarks(self) -> Tuple[str, ...]:
         """Reasons for the verdict."""
         if self.covered_s is None:
-            return self.faults
+            return self.faults if self.goals else ("goals are not recorded", *self.faults)
         first_s, last_s = self.covered_s
-        return (
-            f"recording covers {first_s:.1f} to {last_s:.1f} s; mission not complete",
-            *self.faults,
-        )
+        return (f"recording covers {first_s:.1f} to {last_s:.1f} s", *self.faults)
 
     @property
     def faults(self) -> Tuple[str, ...]:
         """Reasons why the flight failed."""
         found = [f"ended early ({self.reason})"] if self.reason else []
-        missed = self.sent - self.reached
+        missed = self.goals - self.reached
         if self.covered_s is not None:
             missed = sum(robot.skipped for robot in self.robots)
         if missed:
-            found.append(f"{missed} of {self.sent} goals not reached")
+            found.append(f"{missed} of {self.goals} goals not reached")
         if self.contacts:
             found.append(f"{self.contacts} contact{'s' * (self.contacts > 1)}")
-        return tuple(found) if self.sent or self.covered_s else (*found, "no goal was sent")
+        return tuple(found)
 
     @property
     def detour(self) -> Optional[float]:
@@ -213,7 +212,7 @@ def _robot(
     ]
     return RobotMetrics(
         robot.name,
-        len(robot.goals),
+        len(robot.goals) + len(robot.unsent),
         sum(goal.reached for goal in robot.goals),
         sum(goal.ended_s is not None and not goal.reached for goal in robot.goals),
         path_length_m(robot, span),

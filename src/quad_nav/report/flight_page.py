@@ -36,6 +36,8 @@ from quad_nav.report.robot_plots import (
 )
 from quad_nav.report.timeline import timeline
 
+_NOT_RECORDED = "Not recorded."
+
 
 def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page:
     """Build the report of one flight; ``wall_time_s`` is how long it took, if known."""
@@ -120,32 +122,44 @@ def _note(encounter: Encounter) -> str:
 def _curves(
     trace: FlightTrace, tracks: Tracks, flight: FlightMetrics, shown: Sequence[Encounter]
 ) -> List[Section]:
-    goals = timeline(trace)
     return [
         _distances(trace, tracks, shown),
-        Section(
-            "timeline",
-            "Timeline",
-            "A bar is a goal with its number, from sending it to its end.",
-            plots=(timeline_plot(goals),),
-            paper=(picture("timeline", "Goals over time", lambda: timeline_picture(goals)),),
-        ),
+        _timeline(trace),
         *_localization(trace, flight),
         _motion(trace, flight),
         _cycles(trace),
     ]
 
 
+def _timeline(trace: FlightTrace) -> Section:
+    content = timeline(trace)
+    if not content.series and not content.marks:
+        return Section("timeline", "Timeline", _NOT_RECORDED)
+    return Section(
+        "timeline",
+        "Timeline",
+        "A bar is a goal with its number, from sending it to its end.",
+        plots=(timeline_plot(content),),
+        paper=(picture("timeline", "Goals over time", lambda: timeline_picture(content)),),
+    )
+
+
 def _distances(trace: FlightTrace, tracks: Tracks, shown: Sequence[Encounter]) -> Section:
     panels = distance_panels(trace, tracks, shown)
     names = [robot.name for robot in trace.robots]
     contacts_s = [contact.time_s for contact in trace.contacts]
+    marks = "Dashed lines are contacts."
+    if len(trace.robots) > 1:
+        marks = (
+            "Letters are the moments shown above, the dotted line is the limit of close "
+            f"encounters, {CLOSE_M:g} m, and dashed lines are contacts."
+        )
     return Section(
         "gaps",
         "Distances and speeds",
         "Separation is the distance between the hulls of two robots, clearance the distance from "
         f"a hull to the nearest obstacle or wall. Hulls are discs of {trace.robot_radius_m:.2f} m "
-        "radius; below zero they overlap. Letters are close encounters, dashed lines contacts.",
+        f"radius; below zero they overlap. {marks}",
         plots=(distance_plot([*panels, speed_panel(trace)], names, contacts_s),),
         paper=(
             picture(
@@ -192,6 +206,8 @@ def _localization(trace: FlightTrace, flight: FlightMetrics) -> List[Section]:
 
 
 def _cycles(trace: FlightTrace) -> Section:
+    if not any(len(one.cycle_walls_s) or len(one.cycle_times_s) > 1 for one in trace.robots):
+        return Section("cycles", "Control cycles", _NOT_RECORDED)
     caption = (
         "A cycle that takes longer than the control period delays all navigators of its process."
         if has_wall_times(trace)

@@ -15,7 +15,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.textpath import TextPath
 
 from quad_nav.recording.trace import FlightTrace, RobotTrace
-from quad_nav.report.distances import SHOWN_M, Panel
+from quad_nav.report.distances import Panel
 from quad_nav.report.encounters import LETTERS
 from quad_nav.report.marks import Marks
 from quad_nav.report.measures import Tracks, goal_end_s, position_m, trace_span_s
@@ -241,7 +241,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     axes.set(
         title=panel.title + (", smallest of all in black" if many else ""),
         ylabel="distance (m)",
-        ylim=(panel.bottom, SHOWN_M),
+        ylim=panel.shown,
     )
 
 

@@ -7,10 +7,10 @@ as in the mission's summary.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import List, Optional, Sequence, Tuple
+from typing import List, Optional, Tuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from quad_nav.mission import distances
 from quad_nav.mission.flight_log import SPIN_ABOVE_RADPS, SPIN_BELOW_MPS
@@ -167,7 +167,7 @@ def position_m(robot: RobotTrace, time_s: float) -> NDArray[np.float64]:
     )
 
 
-def smallest(values: Sequence[float]) -> Optional[float]:
+def smallest(values: ArrayLike) -> Optional[float]:
     """Return the smallest finite value, or None."""
     known = np.asarray(values, dtype=float)
     known = known[np.isfinite(known)]

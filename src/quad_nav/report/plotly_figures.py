@@ -6,7 +6,7 @@ from typing import Any, Dict, List, Optional, Sequence
 
 import numpy as np
 
-from quad_nav.report.distances import SHOWN_M, Curve, Panel
+from quad_nav.report.distances import Curve, Panel
 from quad_nav.report.marks import Hover, Marks
 from quad_nav.report.measures import speed_mps
 from quad_nav.report.paths import FlownPath, PathsMap
@@ -108,7 +108,7 @@ def distance_plot(
             f"{name} ({panel.unit})", domain=[1.0 - (row + 0.84) * height, top]
         )
         if panel.least is not None:
-            axes[f"yaxis{number}"]["range"] = [panel.bottom, SHOWN_M]
+            axes[f"yaxis{number}"]["range"] = panel.shown
         traces += _panel_traces(panel, names, f"y{number}", row == 0)
         shapes += _limits(panel, f"y{number}")
         titles.append(_title(panel.title, top))
@@ -200,7 +200,7 @@ def _marks_trace(marks: Marks, scale: float = 1.0, axis_name: str = "y") -> Json
             "color": ["#fff" if full else colour for full in filled],
         }
         marker["size"] = round(marker["size"] * scale, 1)
-        marker["color"] = [colour if full else "#fff" for full in filled]
+        marker["color"] = [colour if full else PAPER for full in filled]
         marker["line"] = {"color": colour, "width": 2}
     return {
         "type": "scatter",
@@ -320,11 +320,12 @@ def _bars_trace(series: Bars) -> Json:
 
 
 def _goal_style(series: Bars) -> Json:
+    colours = [rgb(bar.number or 0, _PALE if bar.is_pale else 1.0) for bar in series.bars]
     return {
-        "color": [rgb(bar.number or 0, _PALE if bar.is_pale else 1.0) for bar in series.bars],
+        "color": colours,
         "line": {
             "color": ALARM if series.is_failure else PAPER,
             "width": 2 if series.is_failure else 1,
         },
-        "pattern": {"shape": "/" if series.is_hatched else "", "fgcolor": "#fff"},
+        "pattern": {"shape": "/" if series.is_hatched else "", "fgcolor": colours},
     }

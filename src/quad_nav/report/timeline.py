@@ -26,7 +26,7 @@ class Bar:
         hover: Its text.
         text: Text in the bar.
         number: Number of the robot whose colour it has; None for the colour of the series.
-        is_pale: The colour is paler than that of its neighbour.
+        is_pale: The colour is pale: of every second goal, and below hatching.
     """
 
     y: float
@@ -107,7 +107,7 @@ def _goals(trace: FlightTrace, is_shown: Callable[[GoalTrace], bool]) -> List[Ba
             _goal_hover(goal, row, robot),
             str(goal.index + 1),
             row,
-            k % 2 == 1,
+            k % 2 == 1 or not goal.reached,
         )
         for row, robot in enumerate(trace.robots)
         for k, goal in enumerate(robot.goals)

@@ -13,6 +13,7 @@ from report_pages import Parsed, assert_loads_nothing, figures_of
 
 from quad_nav.report.compared_flight import compared_flight, difference_rows, variants
 from quad_nav.report.comparison import comparison_page
+from quad_nav.report.plot import INK, PAPER
 from quad_nav.sim.contacts import Contact
 
 SLOW, FAST = {"controller_frequency": 5.0}, {"controller_frequency": 10.0}
@@ -69,6 +70,12 @@ def test_values_and_the_best_of_completed_flights():
     )
 
 
+def test_a_recording_that_is_not_complete_has_a_mark_of_its_own():
+    cut = replace(flights()[0], metrics=replace(flights()[0].metrics, covered_s=(0.0, 9.0)))
+    (legend,) = comparison_page([cut]).pictures[1].draw().legends
+    assert [text.get_text() for text in legend.get_texts()] == ["mission not complete"]
+
+
 def test_only_what_differs_is_in_the_table():
     rows = difference_rows(flights(), variants(flights()))
     assert [(row.path, row.values, row.default) for row in rows] == [
@@ -121,6 +128,7 @@ def test_paths_are_in_one_plot():
     assert lines[1]["x"][-1] == 4.0 and lines[1]["customdata"][-1] == [5.0, 0.6]
     goals = next(one for one in figure["data"] if one.get("name") == "goal")
     assert (goals["text"], goals["x"]) == (["0.1"], [4.0])  # once, though all fly there
+    assert (goals["textfont"]["color"], goals["marker"]["color"]) == ([INK], [PAPER])  # dark, too
 
 
 @pytest.mark.filterwarnings("error")

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from hand_made_traces import TIMES_S, flight, robot
 
+from quad_nav.report.distances import distance_panels
 from quad_nav.report.encounter_picture import encounter_picture, frame_times
 from quad_nav.report.encounters import closest_moment, encounters, separation_text
-from quad_nav.report.matplotlib_figures import paths_picture
+from quad_nav.report.matplotlib_figures import distance_picture, paths_picture
 from quad_nav.report.measures import resampled_tracks
 from quad_nav.report.paths import flown_paths
 from quad_nav.report.style import styled
@@ -37,15 +38,16 @@ def test_two_pass_each_other():
 
 
 def test_a_flight_without_encounters_has_a_closest_moment():
-    trace = passing(3.0)
+    trace = passing(4.6)
     tracks = resampled_tracks(trace)
     (one,) = closest_moment(trace, tracks)
     assert (one.robot, one.other, one.is_close) == (0, 1, False)
-    assert (one.time_s, one.separation_m) == (pytest.approx(5.0), pytest.approx(2.4))
-    assert (one.x_m, one.y_m) == (pytest.approx(3.5), pytest.approx(3.5))
+    assert (one.time_s, one.separation_m) == (pytest.approx(5.0), pytest.approx(4.0))
+    assert (one.x_m, one.y_m) == (pytest.approx(3.5), pytest.approx(4.3))
     (left, right), *_ = [axes.get_xlim() for axes in encounter_picture(trace, tracks, one).axes]
-    assert right - left == pytest.approx(2.4 + 6 * 0.3)  # both are inside
+    assert right - left == pytest.approx(4.0 + 6 * 0.3)  # both are inside
     assert closest_moment(flight(), resampled_tracks(flight())) == ()
+    assert distance_picture(distance_panels(trace, tracks), "ab", ()).axes[0].get_ylim()[1] > 4.0
 
 
 def test_what_repeats_soon_is_one_encounter():

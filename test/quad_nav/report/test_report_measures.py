@@ -97,7 +97,7 @@ def test_metrics_of_a_flight():
         goals=(goal(0, (3.0, 2.0), 1.0, 4.0), goal(1, (5.0, 2.0), 4.0, 9.0)),
     )
     found = flight_metrics(flight(done, robot(1, (1.0, 4.0))))
-    assert (found.sent, found.reached, found.contacts, found.recoveries) == (2, 2, 0, 1)
+    assert (found.goals, found.reached, found.contacts, found.recoveries) == (2, 2, 0, 1)
     assert found.mission_s == pytest.approx(8.0)
     assert found.detour == pytest.approx(1.0)
     assert found.min_separation_m == pytest.approx(2.0 - 0.6)
@@ -117,4 +117,4 @@ def test_faults_say_why_a_flight_failed():
     assert found.faults == ("ended early (interrupted)", "1 of 1 goals not reached", "1 contact")
     assert found.robots[0].contacts == 1
     for trace in (flight(robot(0, (1.0, 1.0))), flight()):
-        assert flight_metrics(trace).faults == ("no goal was sent",)
+        assert flight_metrics(trace).remarks == ("goals are not recorded",)
