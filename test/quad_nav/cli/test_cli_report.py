@@ -40,7 +40,7 @@ def test_one_flight(report, tmp_path):
     result = report("../good.bag")
     assert (result.exit_code, result.output) == (0, "report: report.html\n")
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "<h1>good.bag</h1>" in html and "0 of 2" in html
+    assert "<h1>good.bag</h1>" in html and "0 of 6" in html
     assert "ended early (time limit of 0.5 s)" in html
     assert "TrajectoryPlannerROS/max_vel_x" in html
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["report.html"]
