@@ -108,8 +108,8 @@ def test_a_robot_is_told_where_it_is_and_searches_the_whole_map(serve, open_page
 
 
 def believed_near(x_m, y_m):
-    """Return the condition that robot 0 believes itself near a place."""
-    return f"(({{x, y}}) => Math.hypot(x - {x_m}, y - {y_m}) < 1)(arena.fleet.localizations[0])"
+    """Return the condition that robot 0 believes itself near a place: particles spread by 0.5 m."""
+    return f"(({{x, y}}) => Math.hypot(x - {x_m}, y - {y_m}) < 1.7)(arena.fleet.localizations[0])"
 
 
 def test_a_flight_that_has_ended_shows_its_result_and_its_closest_moments(
