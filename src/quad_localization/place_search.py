@@ -62,9 +62,8 @@ class PlaceSearch:
     def __init__(self, grid: OccupancyMap, state: State) -> None:
         """Take a map, and the state of the random numbers."""
         self._grid, self._state = grid, state
-        away_m = np.append(
-            obstacle_distances(grid, _FAR_M), math.inf
-        )  # the last value is that outside the map
+        # The last value is that outside the map.
+        away_m = np.append(obstacle_distances(grid, _FAR_M), math.inf)
         self._near = (away_m < _NEAR_M).astype(np.float64)
         self._coarse, self._fine = (
             np.exp(-0.5 * np.square(away_m / one)) for one in (_COARSE_M, _FINE_M)
@@ -113,7 +112,7 @@ class PlaceSearch:
 
     @property
     def is_complete(self) -> bool:
-        """Whether enough random poses were tried to find every place of the map."""
+        """Whether random poses were tried near every place of the map."""
         area_m2 = len(self._grid.free_places) * self._grid.frame.resolution**2
         return self._drawn * _BASIN >= _COVERAGE * area_m2 * math.tau
 

@@ -45,7 +45,7 @@ def test_a_cart_a_person_and_what_robots_track_of_them(serve, open_page):
     assert colour_at(street, "fleet.obstacles[0]") == [0xCC, 0x5C, 0x33, 255]
     street.page.evaluate(f"() => {ARENA}.apply({{ mode: '3d', layers: ['track'] }})")
     street.wait_for_arena("arena.view._obstacles?._solids.length === 2")
-    x_m = street.arena("view._obstacles._solids[0]?.position.x")
+    x_m = street.arena("view._obstacles._solids[0].position.x")
     street.wait_for_arena(f"Math.abs(arena.view._obstacles._solids[0]?.position.x - {x_m}) > 0.2")
     assert street.arena("view._obstacles._solids[1].userData.tip.visible")
     street.wait_for_arena("arena.fleet.tracks.length === 6")

@@ -33,7 +33,7 @@ _MARKS: Mapping[str, Dict[str, Any]] = {
     "not complete": {"marker": "D", "ms": 5.0, "color": QUIET},
     "unknown": {"marker": "s", "ms": 5.0, "color": QUIET},
 }
-"""How flights are drawn, by their verdicts."""
+"""Marks of flights in the picture, by verdict."""
 _PANELS = ("mission time", "detour", "recoveries", "min clearance", "min separation", "contacts")
 
 

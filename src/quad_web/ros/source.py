@@ -33,7 +33,8 @@ from quad_web.view.state import FleetState, Item, Wanted, robots_by_layer
 PERIOD_S = 0.05  # wall time, as the others; the stream sends half as often
 RESTING_S = 0.2  # without clients
 _LAYERS_EVERY, _ROWS_EVERY, _TOPICS_EVERY, _HEALTH_EVERY = 2, 5, 10, 20  # periods
-_TOLD_S, _EXPECTED_S = 1.5, 5.0  # until diagnostics tell of a pause, a stop or a start; longest
+_OUTDATED_S = 1.5  # after an action the diagnostics may still be those from before it
+_EXPECTED_S = 5.0  # longest time until they tell of a pause, a stop or a start
 _SETTLES_S = 2.0  # time until a navigator tells of a goal that was sent
 _JUMP_S = 0.5
 
@@ -84,7 +85,7 @@ class FlightSource:
     def _is(self, name: str, told: bool) -> bool:
         """Return whether the flight is in a state; ``told`` is what the nodes say."""
         since_s, is_so = self._expected.get(name, (-math.inf, told))
-        patience_s = _TOLD_S if told is is_so else _EXPECTED_S
+        patience_s = _OUTDATED_S if told is is_so else _EXPECTED_S
         if time.monotonic() - since_s > patience_s:
             self._expected.pop(name, None)
             return told
