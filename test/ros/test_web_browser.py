@@ -82,6 +82,7 @@ class WebBrowser(FlightCase):
         # A goal of the mission would replace this one, on a busy machine soon after it is sent.
         self.wait(lambda: self.speed(0) > 0.2, "quad0 flying to its first goal")
         trigger("/mission/stop")
+        expect(driver.at("flight-state")).to_have_text("stopped")
         goal = 3.0, 9.0
         driver.select(0)
         driver.use_goal_tool()
@@ -93,6 +94,8 @@ class WebBrowser(FlightCase):
         driver.wait_for_arena(f"Math.hypot({robot}.x - {goal[0]}, {robot}.y - {goal[1]}) < 1.0")
         trigger("/mission/resume")
         self.wait(lambda: self.speed(0) > 0.2, "quad0 flying to its first goal again")
+        # Diagnostics, which the page goes by, come once a second: until then its button resumes.
+        expect(driver.at("flight-state")).to_have_text("running")
 
     def test_3_a_flight_by_keyboard_alone(self):
         self.driver.fly_by_keyboard()
