@@ -166,6 +166,7 @@ class AmclCase(unittest.TestCase):
 
     def test_1_localises_from_the_parameters(self):
         self.wait_localised("from the parameters")
+        wait(lambda: self.poses and self.clouds, "a pose and its particles")
         pose, cloud = self.poses[-1], self.clouds[-1]
         self.assertEqual((pose.header.frame_id, cloud.header.frame_id), ("map", "map"))
         self.assertGreater(pose.pose.covariance[0], 0.0)
@@ -253,8 +254,12 @@ class AmclCase(unittest.TestCase):
             return Pose2D(*saved).distance_to(Pose2D(2.0, 2.0))
 
         wait(lambda: abs(saved_m() - 0.5) < NEAR_M, lambda: f"saved {saved_m():.2f} m away")
-        saved = rospy.get_param("/amcl0/initial_cov_xx")
-        self.assertIn(saved, [one.pose.covariance[0] for one in self.poses])
+
+        def is_of_a_pose():
+            saved = rospy.get_param("/amcl0/initial_cov_xx")
+            return saved in [one.pose.covariance[0] for one in self.poses]
+
+        wait(is_of_a_pose, "a covariance that was published")
 
     def test_7_stays_localised_face_to_face(self):
         self.world.has_peer = True

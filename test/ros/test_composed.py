@@ -65,10 +65,10 @@ class Composed(FlightCase):
         intruder.unregister()
         counts, begin_s = [len(record.messages) for record in commands], rospy.get_time()
         self.simulated_seconds(8.0)
-        elapsed_s = rospy.get_time() - begin_s
-        for record, count in zip(commands, counts):  # a busy machine leaves some cycles out
-            self.assertLess((len(record.messages) - count) / elapsed_s, 10.3)
-            self.assertGreater((len(record.messages) - count) / elapsed_s, 5.0)
+        cycles = 10.0 * (rospy.get_time() - begin_s)
+        for record, count in zip(commands, counts):  # a busy machine leaves some out, or is late
+            self.assertLess(len(record.messages) - count, cycles + 6)
+            self.assertGreater(len(record.messages) - count, 0.5 * cycles)
         self.assertAlmostEqual(scans.rate_hz(), 10.0, delta=0.1)
 
     def test_3_parameters_costmaps_and_diagnostics(self):
@@ -125,10 +125,9 @@ class Composed(FlightCase):
         self.wait(lambda: pid_of("/fleet1") not in (None, pid), "/fleet1 back")
         self.wait(lambda: not absent((1, 4)), "its interfaces")
         goal = self.goal_topics[1]
-        self.wait(lambda: goal.get_num_connections() > 0, f"a listener on {goal.name}")
         x, y = self.position(1)
-        goal.publish(goal_pose(x, y + (1.5 if y < 6.0 else -1.5)))
-        self.wait(lambda: self.speed(1) > 0.1, "one of its quadcopters flying")
+        pose = goal_pose(x, y + (1.5 if y < 6.0 else -1.5))
+        self.wait(lambda: goal.publish(pose) or self.speed(1) > 0.1, "one of its robots flying")
 
 
 if __name__ == "__main__":

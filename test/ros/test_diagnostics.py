@@ -68,7 +68,7 @@ class Diagnostics(FlightCase):
         self.assertIn("no message on /scan0 for", self.statuses["move_base0: inputs"].message)
         self.wait(lambda: self.level("move_base0: control") == ERROR, "a navigator that stopped")
         self.assertIn("stopping: no data from", self.statuses["move_base0: control"].message)
-        self.assertEqual(self.level("move_base1: inputs"), OK)
+        self.wait(lambda: self.level("move_base1: inputs") == OK, "inputs of the other one")
         self.lidar(0, True)
         self.wait(lambda: self.level("move_base0: inputs") == OK, "inputs that come again")
         self.wait(lambda: self.level("move_base0: control") == OK, "a flight that resumes")

@@ -68,6 +68,7 @@ class LocalizedFlight(FlightCase):
             return item and item.data[key]
 
         self.wait(lambda: flight("state") == "ended", lambda: flight("state"))
+        self.wait(lambda: state.item("result"), "the result")
         self.assertEqual(state.item("result").data["reached"], 6)
         self.wait(lambda: state.item("localization/0"), "where robot 0 believes itself")
         self.wait(lambda: state.item("status").data["rows"][0]["localization"], "its figures")
@@ -79,15 +80,15 @@ class LocalizedFlight(FlightCase):
         def has_error_after_a_pose():
             """A busy machine may lose the one true pose that belongs to it: then another one."""
             count = len(poses.messages)
-            answer = actions.call("set_pose", 0, last)
-            self.assertTrue(answer.ok, answer.text)
+            if not actions.call("set_pose", 0, last).ok:
+                return False  # no subscriber yet
             self.wait(lambda: len(poses.messages) > count, "a pose after that of a person")
             end_s = rospy.get_time() + 5.0
             self.wait(lambda: error_m() is not None or rospy.get_time() > end_s, "time")
             return error_m() is not None
 
         self.wait(has_error_after_a_pose, "the error of a pose")
-        self.assertLess(error_m(), 0.2)
+        self.wait(lambda: (error_m() or 1.0) < 0.2, lambda: f"an error of {error_m()} m below 0.2")
         if name != "amcl":
             return
         self.wait(lambda: len(state.item("localization/0").arrays["points"]) > 100, "particles")

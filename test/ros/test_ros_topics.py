@@ -69,7 +69,8 @@ class RosTopics(FlightCase):
         )
         records = [self.record(topic, kind) for topic, kind, _ in topics]
         tf = self.record("/tf", TFMessage)
-        self.simulated_seconds(5.0)
+        for record, (topic, _, hz) in zip(records, topics):
+            self.wait(lambda r=record, n=5.0 * hz: len(r.messages) > n, f"5 s of {topic}")
         for record, (topic, _, hz) in zip(records, topics):
             self.assertAlmostEqual(record.rate_hz(), hz, delta=0.1 * hz, msg=topic)
         stamps_s = [message.transforms[0].header.stamp.to_sec() for message in tf.messages]

@@ -32,10 +32,10 @@ class Screen(unittest.TestCase):
         self.result = Path(folder.name) / "result.json"
         self.printed = Path(folder.name) / "printed"
 
-    def fly(self, command):
+    def fly(self, command, rate=10):
         with self.printed.open("w") as printed:
             flight = subprocess.Popen(
-                [*command, "rviz:=false", "rate:=10", f"result:={self.result}"],
+                [*command, "rviz:=false", f"rate:={rate}", f"result:={self.result}"],
                 cwd=ROOT,
                 env={**os.environ, "PWD": str(ROOT)},
                 stdout=printed,
@@ -91,7 +91,7 @@ class Screen(unittest.TestCase):
         self.assertNotIn("goal 1 of", self.printed.read_text())
 
     def test_ctrl_c_is_an_interruption(self):
-        flight = self.fly(FLY)
+        flight = self.fly(FLY, rate=1)
         self.wait_for("goal 1 of", flight)
         flight.send_signal(signal.SIGINT)
         self.assertEqual(flight.wait(PATIENCE_S), 130)
@@ -103,7 +103,7 @@ class Screen(unittest.TestCase):
         self.assertEqual((written["reason"], written["exit_status"]), ("interrupted", 130))
 
     def test_a_dead_simulator_ends_the_flight_with_the_reason(self):
-        flight = self.fly(FLY)
+        flight = self.fly(FLY, rate=1)
         self.wait_for("goal 1 of", flight)
         simulator = next(
             pid

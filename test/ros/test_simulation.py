@@ -43,17 +43,23 @@ class Simulation(FlightCase):
         return rospy.get_time() == before
 
     def test_reset_takes_the_quadcopters_back(self):
-        trigger("/simulation/start")
-        trigger("/simulation/reset")
+        resets = Latest("/simulation/last_reset", Time)
+        self.reset(resets)
         trigger("/simulation/start")
         x, y = self.position(0)
         self.fly(0.3, lambda: self.distance(0, x, y) > 0.3, "robot 0 away from its start")
-        resets, before_s = Latest("/simulation/last_reset", Time), rospy.get_time()
+        self.reset(resets)
+        self.assertLess(self.distance(0, x, y), 0.05)
+
+    def reset(self, resets):
+        """Reset, and wait until its time is told and the odometry is no older."""
+        trigger("/simulation/start")
+        before = rospy.Time.now()
         trigger("/simulation/reset")
-        self.wait(lambda: self.distance(0, x, y) < 0.05, "robot 0 back at its start")
+        self.wait(lambda: resets.message and resets.message.data >= before, "the time of the reset")
         self.wait(
-            lambda: resets.message is not None and resets.message.data.to_sec() >= before_s,
-            "the time of this reset",
+            lambda: self.odometry[0].message.header.stamp >= resets.message.data,
+            "odometry of then",
         )
 
     def test_watchdog_hovers_when_commands_stop(self):

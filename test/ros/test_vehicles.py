@@ -23,6 +23,7 @@ from vehicle_case import VehicleCase
 from quad_nav.mission.actions import Event
 
 HEARTBEAT = ardupilotmega.MAVLink_heartbeat_message(2, 3, 81, 9, 3, 3)
+FLYING = ("flying", "holding")  # a bridge holds for a moment where commands are late
 GCS_TIMEOUT_S = 15.0  # a bridge takes 4 s to come back, longer on a loaded machine
 ACTIONS = {"take_off": (TakeOffAction, TakeOffGoal()), "land": (LandAction, LandGoal())}
 
@@ -78,12 +79,13 @@ class Vehicles(VehicleCase):
         self.wait(lambda: rospy.get_param("/mission/quad0/stopped"), "stop of its mission")
         self.assertFalse(rospy.get_param("/mission/quad1/stopped"))
         self.wait(lambda: self.speed(0) < 0.05, "hover of vehicle 0")
-        self.assertEqual(self.states[1], "flying")
+        self.assertIn(self.states[1], FLYING)
         # It neither keeps a take-off waiting nor lets a resumption of all fly it.
         self.assertIn("left out: quad0: taken over", trigger("/vehicles/take_off"))
         trigger("/mission/resume")
         self.wait(lambda: rospy.get_param("/mission/quad0/stopped"), "stop by the bridge")
-        self.assertEqual((self.states[0], self.states[1]), ("taken over", "flying"))
+        self.assertEqual(self.states[0], "taken over")
+        self.assertIn(self.states[1], FLYING)
 
     def somebody_resumes_it(self):
         trigger("/vehicle0/resume")
@@ -125,7 +127,8 @@ class Vehicles(VehicleCase):
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
                 stranger.sendto(data, ("127.0.0.1", 14651))
         rospy.sleep(1.5)  # the state is told once a second
-        self.assertEqual((self.states[0], self.values[0].mode), ("flying", "GUIDED"))
+        self.assertIn(self.states[0], FLYING)
+        self.assertEqual(self.values[0].mode, "GUIDED")
 
     def a_killed_bridge_comes_back_and_lets_its_vehicle_hover(self):
         before = self.buffer.lookup_transform("map", "odom0", rospy.Time()).transform
@@ -139,7 +142,7 @@ class Vehicles(VehicleCase):
         self.assertEqual((self.states[0], self.values[0].mode), ("taken over", "GUIDED"))
         self.assertLess(self.speed(0), 0.05)
         self.assertAlmostEqual(self.odometry[0].pose.pose.position.z, 1.0, delta=0.15)
-        self.assertEqual(self.states[1], "flying")
+        self.assertIn(self.states[1], FLYING)
         after = self.buffer.lookup_transform("map", "odom0", rospy.Time()).transform
         self.assertAlmostEqual(after.translation.x, before.translation.x, delta=1e-6)
         self.assertAlmostEqual(after.rotation.z, before.rotation.z, delta=1e-6)

@@ -74,8 +74,11 @@ class WebBrowser(FlightCase):
         driver.wait_for_arena("arena.fleet.robots.length === 2", PATIENCE_MS / 1e3)
         for robot in (0, 1):
             with self.subTest(robot=robot):
-                shown = driver.arena(f"fleet.robots[{robot}]")
-                self.assertLess(self.distance(robot, shown["x"], shown["y"]), 1.0)
+                self.wait(lambda k=robot: self.is_shown(k), "a robot where it is")
+
+    def is_shown(self, robot):
+        shown = self.driver.arena(f"fleet.robots[{robot}]")
+        return self.distance(robot, shown["x"], shown["y"]) < 1.0
 
     def test_2_a_goal_that_is_dragged_is_flown_to(self):
         driver = self.driver
@@ -116,6 +119,7 @@ class WebBrowser(FlightCase):
         summary = to_json(MissionSummary((robot,), sim_time_s=70.0, wall_time_s=5.0))
         topic = rospy.Publisher("/quad/summary", String, queue_size=1, latch=True)
         topic.publish(json.dumps(summary))
+        expect(self.driver.at("flight-state")).to_have_text("stopped")
         self.driver.at("play").click()  # resumes what the last test has stopped
         expect(self.driver.at("flight-state")).to_have_text("ended")
         card = self.driver.at("result")

@@ -67,8 +67,8 @@ def test_a_quadcopter_arrives_at_a_goal_that_was_clicked_and_stop_all_stops_it(
     expect(flight.at("events").get_by_text("missions stopped")).to_be_in_viewport()
 
 
-def test_a_flight_by_keyboard_alone(serve, open_page, goals, recording):
-    flight = Driver(open_page(serve(command=[*QUAD, "fly", "--web", "--goals", goals]).url))
+def test_a_flight_by_keyboard_alone(serve, open_page, recording):
+    flight = Driver(open_page(serve(command=[*QUAD, "fly", "--web"]).url))
     expect(flight.is_ready().at("flight-state")).to_have_text("running", timeout=60000)
     flight.fly_by_keyboard()
 

@@ -138,16 +138,16 @@ def test_a_slow_head_is_cut_off_after_a_request_too(here, opened, monkeypatch):
     monkeypatch.setattr(connections, "HEAD_WITHIN_S", 0.5)
     client = opened(here.urls.steer)
     host = urlsplit(here.urls.steer).netloc
+    begin_s = time.monotonic()
     client.sendall(f"HEAD /favicon.ico HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
     assert client.recv(12) == b"HTTP/1.1 200"
     time.sleep(0.1)
     client.recv(10_000)
-    begin_s = time.monotonic()
     with pytest.raises(ConnectionError):
         while time.monotonic() < begin_s + PATIENCE_S:
             client.sendall(b"G")
             time.sleep(0.05)
-    assert time.monotonic() - begin_s >= 0.3
+    assert time.monotonic() - begin_s >= 0.5
 
 
 def test_a_page_outlives_the_time_for_a_head(here, monkeypatch):

@@ -35,6 +35,8 @@ def test_a_page_whose_server_hangs_says_so(driver, server):
     notice = driver.page.locator(NOTICE)
     driver.page.watch.forgive(GONE)
     server.pause()
-    expect(notice).to_contain_text("reconnecting")
-    server.resume()
+    try:
+        expect(notice).to_contain_text("reconnecting")
+    finally:
+        server.resume()
     expect(notice).to_be_hidden()

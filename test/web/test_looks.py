@@ -94,6 +94,7 @@ def test_the_legend_lists_what_is_there_below_the_toolbar(open_page, serve, serv
 
 def test_the_selected_robot_has_a_ring_in_black_and_white_and_keeps_its_colour(driver):
     driver.at("play").click()
+    expect(driver.at("flight-state")).to_have_text("paused")
     driver.select(1)
     driver.wait_for_arena("arena.fleet.selected?.index === 1")
     x, y = driver.resting_robot_pixel(1)
@@ -154,6 +155,7 @@ def test_values_lie_within_their_fields_and_banners_stay_on_their_tab(driver):
 def test_the_text_of_a_fault_covers_no_robot(driver):
     """Robot 0 stands where the text below goal 1 would be."""
     driver.at("play").click()
+    expect(driver.at("flight-state")).to_have_text("paused")
     driver.resting_robot_pixel(0)
     told = driver.page.evaluate(
         """async () => {

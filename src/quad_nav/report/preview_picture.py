@@ -131,7 +131,8 @@ def preview_picture(preview: MissionPreview, robots: Sequence[RobotPreview], tit
             interpolation="nearest",
             zorder=2,
         )
-    axes.set(xlim=(x0, x1), ylim=(y0, y1), xlabel="x (m)", ylabel="y (m)", title=title)
+    heading = f"{title}: quad fly refuses it" if preview.problems else title
+    axes.set(xlim=(x0, x1), ylim=(y0, y1), xlabel="x (m)", ylabel="y (m)", title=heading)
     scale = min(1.0, (_FULL_SIZE_UP_TO / max(len(robots), 1)) ** 0.3)
     for robot in robots:
         _draw_robot(axes, robot, preview.robot_radius_m, scale)
