@@ -249,17 +249,14 @@ class AmclCase(unittest.TestCase):
         self.assertEqual(rospy.get_param("/amcl0/max_particles"), 800)
 
     def test_6_saves_the_pose(self):
+        def saved(name):
+            return rospy.get_param(f"/amcl0/initial_{name}")
+
         def saved_m():
-            saved = [rospy.get_param(f"/amcl0/initial_pose_{one}") for one in "xya"]
-            return Pose2D(*saved).distance_to(Pose2D(2.0, 2.0))
+            return Pose2D(*(saved(f"pose_{one}") for one in "xya")).distance_to(Pose2D(2.0, 2.0))
 
         wait(lambda: abs(saved_m() - 0.5) < NEAR_M, lambda: f"saved {saved_m():.2f} m away")
-
-        def is_of_a_pose():
-            saved = rospy.get_param("/amcl0/initial_cov_xx")
-            return saved in [one.pose.covariance[0] for one in self.poses]
-
-        wait(is_of_a_pose, "a covariance that was published")
+        wait(lambda: saved("cov_xx") in (o.pose.covariance[0] for o in self.poses), "a pose's own")
 
     def test_7_stays_localised_face_to_face(self):
         self.world.has_peer = True

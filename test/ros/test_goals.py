@@ -6,73 +6,43 @@ from unittest import mock
 
 import rospy
 import rostest
-from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
-from flight_case import FlightCase, Latest, action_goal, goal_pose
+from actionlib_msgs.msg import GoalID, GoalStatus
+from flight_case import Latest, action_goal, goal_pose
 from geometry_msgs.msg import Point, PointStamped, PoseStamped
-from move_base_msgs.msg import MoveBaseActionResult
+from upstream_case import ROBOTS, UpstreamCase
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.ros.navigator.goal_server import GoalServer
 
 FREE_PLACES = (((1.5, 1.5), (3.0, 6.5)), ((10.0, 2.0), (10.5, 10.0)))
-UNFINISHED = (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING)
 
 
-class Goals(FlightCase):
-    @classmethod
-    def setUpClass(cls):
-        super().setUpClass()
-        cls.results = [Latest(f"/move_base{i}/result", MoveBaseActionResult) for i in (0, 1)]
-        cls.statuses = [Latest(f"/move_base{i}/status", GoalStatusArray) for i in (0, 1)]
-        cls.start()
-
+class Goals(UpstreamCase):
     def setUp(self):
-        for topic in self.cancel_topics:
-            self.wait(lambda t=topic: t.get_num_connections() > 0, f"listener on {topic.name}")
-            topic.publish(GoalID())
-        cancelled = rospy.Time.now()
-        self.wait(lambda: all(self.is_idle(i, cancelled) for i in (0, 1)), "both without a goal")
-        self.wait(lambda: all(self.speed(i) < 0.02 for i in (0, 1)), "both standing")
-
-    def is_idle(self, i, since):
-        """Half a second after a time, no goal is waiting or active."""
-        message = self.statuses[i].message
-        return (
-            message is not None
-            and message.header.stamp > since + rospy.Duration(0.5)
-            and all(s.status not in UNFINISHED for s in message.status_list)
-        )
-
-    def far_place(self, i):
-        """A free place on the robot's own side of the arena, metres away from it."""
-        return max(FREE_PLACES[i], key=lambda place: self.distance(i, *place))
-
-    def result_after(self, i, count):
-        self.wait(lambda: self.results[i].count > count, f"a result of robot {i}")
-        return self.results[i].message.status
+        for i in ROBOTS:
+            self.rest(i)
 
     def test_goal_by_action_is_reached_and_succeeds(self):
-        x, y = self.position(0)
-        self.clients[0].send_goal(action_goal(x + 0.8, y))
+        self.clients[0].send_goal(action_goal(2.3, 1.5))
         self.assertTrue(self.clients[0].wait_for_result(rospy.Duration(60)))
         self.assertEqual(self.clients[0].get_state(), GoalStatus.SUCCEEDED)
         self.assertEqual(self.clients[0].get_goal_status_text(), "Goal reached.")
-        self.assertLess(self.distance(0, x + 0.8, y), 0.2)
+        self.assertLess(self.distance(0, 2.3, 1.5), 0.2)
 
     def test_goal_by_topic_is_reached(self):
         count = self.results[1].count
-        x, y = self.position(1)
-        self.goal_topics[1].publish(goal_pose(x - 0.8, y))
-        self.assertEqual(self.result_after(1, count).status, GoalStatus.SUCCEEDED)
-        self.assertLess(self.distance(1, x - 0.8, y), 0.2)
+        self.goal_topics[1].publish(goal_pose(9.2, 2.0))
+        self.assertEqual(self.result_after(1, count).status.status, GoalStatus.SUCCEEDED)
+        self.assertLess(self.distance(1, 9.2, 2.0), 0.2)
 
     def test_cancelling_one_does_not_stop_the_other(self):
         counts = [result.count for result in self.results]
-        for i in (0, 1):
-            self.goal_topics[i].publish(goal_pose(*self.far_place(i)))
+        for i in ROBOTS:
+            far = max(FREE_PLACES[i], key=lambda place, i=i: self.distance(i, *place))
+            self.goal_topics[i].publish(goal_pose(*far))
         self.wait(lambda: all(self.speed(i) > 0.05 for i in (0, 1)), "both under way")
         self.cancel_topics[0].publish(GoalID())
-        self.assertEqual(self.result_after(0, counts[0]).status, GoalStatus.PREEMPTED)
+        self.assertEqual(self.result_after(0, counts[0]).status.status, GoalStatus.PREEMPTED)
         self.wait(lambda: self.speed(0) < 0.02, "robot 0 standing")
         self.assertEqual(self.results[1].count, counts[1])
         self.wait(lambda: self.speed(1) > 0.05, "robot 1 still under way")

@@ -85,10 +85,9 @@ class LocalizedFlight(FlightCase):
             self.wait(lambda: len(poses.messages) > count, "a pose after that of a person")
             end_s = rospy.get_time() + 5.0
             self.wait(lambda: error_m() is not None or rospy.get_time() > end_s, "time")
-            return error_m() is not None
+            return (error_m() or 1.0) < 0.2
 
-        self.wait(has_error_after_a_pose, "the error of a pose")
-        self.wait(lambda: (error_m() or 1.0) < 0.2, lambda: f"an error of {error_m()} m below 0.2")
+        self.wait(has_error_after_a_pose, lambda: f"an error of {error_m()} m below 0.2")
         if name != "amcl":
             return
         self.wait(lambda: len(state.item("localization/0").arrays["points"]) > 100, "particles")

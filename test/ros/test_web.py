@@ -222,11 +222,10 @@ class Web(FlightCase):
 
     def goal_under_way(self):
         """Whether quad1 is far from its goal, not its last, and the page and its actions know."""
-        number = self.health.progress(1).goal
-        if not number or self.page.row(1)["goal"] != number:
+        number, goals = self.health.progress(1).goal, self.page.goals(1)
+        if self.page.row(1)["goal"] != number or number not in range(1, len(goals)):
             return False
-        goals = self.page.goals(1)[:-1]
-        goal = goals[number - 1] if number <= len(goals) else {"state": "the last"}
+        goal = goals[number - 1]
         return goal["state"] == "active" and self.distance(1, goal["x"], goal["y"]) > 1.5
 
     def test_6_saved_goals_are_flown(self):
