@@ -16,7 +16,7 @@ from typing import Deque, Hashable, Optional
 CLOCK_LAG_S = 0.5
 """The navigator stamps an id when it receives the goal; its clock may lag behind ours."""
 RENAME_S = 5.0
-"""A restarted navigator takes the active goal within this time after it subscribes."""
+"""A navigator takes a goal within this time after it is sent, or after it subscribes."""
 MAX_IDS = 1000
 """Ids that are remembered: a navigator names a goal for a few seconds after its end."""
 
@@ -42,7 +42,7 @@ class GoalIds:
         self._earlier: Deque[Hashable] = deque(maxlen=MAX_IDS)
         self._other: Deque[Hashable] = deque(maxlen=MAX_IDS)
         self._renames_until_s = -math.inf
-        self._is_nameless = False  # a goal was replaced before its id was known
+        self._nameless_s = math.inf  # when a goal was sent that has ended before its id was known
 
     def send(self, now_s: float) -> None:
         """Register that a goal is sent: its id is one that has not been seen yet."""
@@ -60,7 +60,7 @@ class GoalIds:
         """Register that the active goal has ended."""
         if self._active is not None:
             self._earlier.append(self._active)
-        self._is_nameless = self._sent_s < math.inf and self._active is None
+        self._nameless_s = self._sent_s if self._active is None else math.inf
         self._active, self._sent_s, self._renames_until_s = None, math.inf, -math.inf
 
     def see(self, goal_id: Hashable, stamp_s: float) -> Owner:
@@ -76,6 +76,10 @@ class GoalIds:
             return Owner.EARLIER
         if goal_id in self._other:
             return Owner.OTHER
+        if self._sent_s == math.inf and 0.0 <= stamp_s - self._nameless_s + CLOCK_LAG_S < RENAME_S:
+            self._nameless_s = math.inf
+            self._earlier.append(goal_id)
+            return Owner.EARLIER
         is_free = self._active is None or stamp_s <= self._renames_until_s
         if is_free and stamp_s >= self._sent_s - CLOCK_LAG_S:
             if self._active is not None:
@@ -91,7 +95,7 @@ class GoalIds:
         Such a goal cannot be the last one if the one before it never got an id.
         """
         is_known = goal_id in self._earlier or goal_id in self._other
-        if self._is_nameless and self._active is None and not is_known:
-            self._is_nameless = False
+        if self._nameless_s < math.inf and self._active is None and not is_known:
+            self._nameless_s = math.inf
             self._earlier.append(goal_id)
         return self.see(goal_id, stamp_s)

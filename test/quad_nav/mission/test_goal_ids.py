@@ -63,6 +63,16 @@ def test_a_goal_that_was_replaced_before_its_id_was_known():
     assert ids.see("b", 10.03) is ACTIVE
 
 
+def test_a_goal_that_ended_before_its_id_was_known():
+    """As where a stop overtakes it."""
+    ids = flying()
+    ids.send(20.0)
+    ids.clear()
+    assert ids.see("rviz", 25.0) is OTHER
+    assert ids.see("late", 20.02) is EARLIER
+    assert ids.see("rviz 2", 20.03) is OTHER
+
+
 def test_a_restarted_navigator_gives_the_goal_another_id():
     ids = flying()
     ids.resend(15.0)

@@ -8,8 +8,9 @@ import pytest
 
 rospy = pytest.importorskip("rospy")
 
+from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray  # noqa: E402
 from ros.fake_mission import STARTS, Mission, call, stopped  # noqa: E402
-from ros.fake_ros import FakePublisher, FakeRos  # noqa: E402
+from ros.fake_ros import FakePublisher, FakeRos, deliver  # noqa: E402
 
 from quad_nav.mission.sequencer import NavigatorReport, Verdict  # noqa: E402
 
@@ -168,3 +169,21 @@ def test_a_stop_during_a_resumption_cancels_at_once_and_lasts(mission):
     thread.join()
     assert robot.is_stopped and cancelled.is_set()
     assert mission.fly(120.0) == []
+
+
+def test_a_goal_that_a_stop_overtakes_is_cancelled_by_its_id(mission):
+    """It reaches the navigator after the cancel of all; a goal of a person is left alone."""
+    mission.begin()
+    mission.fly(100.0)
+    call("/mission/stop", 100.0)
+    cancels = FakePublisher.all["/move_base0/cancel"]
+    assert cancels.last == GoalID()
+    late, persons = (
+        GoalID(rospy.Time.from_sec(s), name) for s, name in ((100.1, "a"), (100.2, "b"))
+    )
+    for unfinished in ([late], [late, persons], [persons]):
+        statuses = [GoalStatus(one, GoalStatus.ACTIVE, "") for one in unfinished]
+        deliver("/move_base0/status", GoalStatusArray(status_list=statuses))
+        cancels.last = None
+        mission.fly(100.3)
+        assert cancels.last == (late if late in unfinished else None)

@@ -45,10 +45,6 @@ class MissionStop:
         """
         self._robots = robots
         self._lock = threading.Lock()  # held by a request, apart from the first part of a stop
-        self._cancels = {
-            robot.name: rospy.Publisher(f"/move_base{i}/cancel", GoalID, queue_size=1)
-            for i, robot in enumerate(robots)
-        }
         for robot in robots if respawned else ():
             is_stopped = rospy.get_param(_prefix(robot) + "/stopped", robot.is_stopped) is True
             robot.is_stopped = is_stopped or rospy.get_param(STOPPED_PARAMETER, False) is True
@@ -77,7 +73,7 @@ class MissionStop:
     def _cancel(self, robots: Sequence[MissionRobot]) -> None:
         for robot in robots:
             robot.is_stopped = True
-            self._cancels[robot.name].publish(GoalID())  # without an id: all goals
+            robot.link.cancels.publish(GoalID())  # without an id: all goals
 
     def _store(self, robots: Sequence[MissionRobot]) -> None:
         rospy.set_param(STOPPED_PARAMETER, self._are_all_stopped())

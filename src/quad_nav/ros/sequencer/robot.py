@@ -131,6 +131,8 @@ class MissionRobot:
         self.now_s, inbox = now_s, self.link.pop()
         if self.is_stopped:
             self.hold(now_s)  # in case the stop has found the step before in progress
+            for goal_id in inbox.unfinished:  # the stop's cancel may have overtaken a goal
+                self.link.cancels.publish(goal_id)
         if not self._is_recorded:
             record.add_progress(self.name, self.sequencer, now_s)
             self._is_recorded = True

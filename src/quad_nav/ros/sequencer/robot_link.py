@@ -10,7 +10,7 @@ from typing import Any, Callable, Deque, List, Optional, Tuple
 
 import numpy as np
 import rospy
-from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from geometry_msgs.msg import PoseStamped
 from move_base_msgs.msg import MoveBaseActionResult, RecoveryStatus
 from nav_msgs.msg import Odometry, Path
@@ -48,6 +48,7 @@ class Inbox:
     reports: Deque[NavigatorReport] = field(default_factory=lambda: deque(maxlen=MAX_WAITING))
     recoveries: Deque[RecoveryStatus] = field(default_factory=lambda: deque(maxlen=MAX_WAITING))
     subscribers: List[Callable[[PoseStamped], Any]] = field(default_factory=list)
+    unfinished: List[GoalID] = field(default_factory=list)  # of the sequencer, in the last status
 
 
 class RobotLink(rospy.SubscribeListener):
@@ -55,6 +56,7 @@ class RobotLink(rospy.SubscribeListener):
 
     Attributes:
         goals: Publisher of the goals.
+        cancels: Publisher of requests to cancel them.
         odometry_topic: Name of the topic of odometry.
         received: Set by what the robot's thread should not wait with.
         wake: When states wake the thread, as `StateFeed` defines it, float64[4].
@@ -75,6 +77,7 @@ class RobotLink(rospy.SubscribeListener):
         self.goals = rospy.Publisher(
             f"/move_base_simple/goal{index}", PoseStamped, subscriber_listener=self, queue_size=2
         )
+        self.cancels = rospy.Publisher(f"{action}/cancel", GoalID, queue_size=10)
         self.odometry_topic = rospy.resolve_name(f"/odom{index}")
         self.wake = wake
         self._subscribers = [
@@ -172,8 +175,11 @@ class RobotLink(rospy.SubscribeListener):
     def _on_status(self, message: GoalStatusArray) -> None:
         unfinished = [status for status in message.status_list if status.status in _BUSY]
         with self._lock:
-            for status in unfinished[-MAX_IDS:]:
-                self._ids.see(*_id_of(status))
+            self._inbox.unfinished = [
+                status.goal_id
+                for status in unfinished[-MAX_IDS:]
+                if self._ids.see(*_id_of(status)) is not Owner.OTHER
+            ]
         self._busy = bool(unfinished)
         self._status_s = rospy.get_time()
 
