@@ -159,13 +159,14 @@ class FlightActions(GoalEditing):
     def stop_all(self) -> Answer:
         """Cancel all goals and stop the mission, with or without a sequencer that responds."""
         outcome: List[str] = []
+        failure: List[str] = []
         stopped = threading.Event()
 
         def stop() -> None:
             try:
                 outcome.append(_triggered(STOP_SERVICE))
             except CallFailed as error:
-                rospy.logwarn("web: stopping the mission failed: %s", error)
+                failure.append(str(error))
             stopped.set()
 
         threading.Thread(target=stop, daemon=True).start()
@@ -182,7 +183,8 @@ class FlightActions(GoalEditing):
             return Answer(False, f"all goals cancelled, but of {names}: no navigator is connected")
         hover = "every quadcopter hovers"
         if not outcome:
-            return Answer(True, f"all goals cancelled: {hover}; there is no mission to stop")
+            why = failure[0] if failure else f"{STOP_SERVICE}: no response"
+            return Answer(True, f"all goals cancelled: {hover}; no mission stopped: {why}")
         self._source.expect(stopped=True)
         return Answer(True, f"missions stopped: {hover}; Resume continues them")
 
