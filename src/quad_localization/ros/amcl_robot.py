@@ -193,7 +193,8 @@ class AmclRobot:
         planar = Pose2D(pose.x_m, pose.y_m, tilted_yaw(pose.quaternion))
         with self._lock:
             self._amcl.set_pose(PoseEstimate(planar, covariance))
-        rospy.loginfo("%s: pose set: %s", self.name, planar)
+        place = f"({planar.x_m:.2f}, {planar.y_m:.2f}) m, {planar.yaw_rad:.2f} rad"
+        rospy.loginfo("%s: pose set to %s", self.name, place)
         return True
 
     def _motion_since(self, stamp: rospy.Time) -> Pose3D:
