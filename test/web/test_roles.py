@@ -7,9 +7,11 @@ from browser import until
 TOKENS = ("--robots", "2", "--steer-token", "steer-abc", "--watch-token", "watch-def")
 
 # Sends every event of every element, as if a person had enabled and used all of the controls.
-# Returns how many there were, once the server has handled all of them.
+# Returns how many there were, once the server has handled all of them. Before the page's handshake
+# it would ignore them.
 FORGE = """
 async () => {
+  while (!window.did_handshake) await new Promise(requestAnimationFrame);
   const handled = [];
   for (const [id, element] of Object.entries(mounted_app.elements)) {
     for (const event of element.events ?? []) {
