@@ -24,7 +24,7 @@ from quad_nav.ros.navigator.intention_topics import INTENTIONS_TOPIC, intentions
 from quad_nav.sim.contacts import Contact
 
 FLOOD = 30  # messages; ten for each simulated second
-FEW = (3, 1.0)  # number and period of goals: each replaces the sequencer's goal
+FEW = 3  # goals: each replaces the sequencer's, and one of the other kind that comes with it
 AHEAD_S = 20.0
 END_OF_TIME = rospy.Time(2**32 - 1, 990_000_000)
 LONG_ID = "a" * 2**20
@@ -155,7 +155,12 @@ KINDS: Dict[str, Kind] = {
     ),
     "NaN command": Kind("/cmd_vel0", Twist, command, {SIMULATOR: "command dropped"}),
     "goal with a NaN yaw": Kind(
-        "/move_base_simple/goal0", PoseStamped, rotated_goal, {"/move_base0": "quaternion"}, *FEW
+        "/move_base_simple/goal0",
+        PoseStamped,
+        rotated_goal,
+        {"/move_base0": "quaternion"},
+        FEW,
+        0.7,
     ),
     "cancel with a long id": Kind(
         "/move_base0/cancel", GoalID, lambda: GoalID(id=LONG_ID), {"/move_base0": "cancel"}
@@ -164,7 +169,7 @@ KINDS: Dict[str, Kind] = {
         INTENTIONS_TOPIC, PointCloud2, intention, {"/move_base1": "intention dropped"}
     ),
     "NaN goal of an action client": Kind(
-        "/move_base0/goal", MoveBaseActionGoal, action_goal, {"/move_base0": "not finite"}, *FEW
+        "/move_base0/goal", MoveBaseActionGoal, action_goal, {"/move_base0": "not finite"}, FEW, 1.0
     ),
 }
 # rospy closes the connection without a line in the log.

@@ -21,7 +21,7 @@ from quad_nav.mission.actions import Event
 
 NODES = (SIMULATOR, SEQUENCER, *NAVIGATORS)
 LONGEST_HOVER_S = {0: 8.0, 1: 2.5}  # simulated time; robot 1 receives no hostile message
-LOGS_WITHIN_S = 30.0  # wall time, as the next
+LOGS_WITHIN_S = 10.0  # wall time, as the next
 PERIOD_S = 0.1  # simulated
 COMPILES_S = 240.0  # without a cache of compiled kernels
 MOST_LINES = 3  # of a node about one kind
