@@ -112,7 +112,7 @@ class PlaceSearch:
 
     @property
     def is_complete(self) -> bool:
-        """Whether random poses were tried near every place of the map."""
+        """Whether enough random poses were tried for the area of the map."""
         area_m2 = len(self._grid.free_places) * self._grid.frame.resolution**2
         return self._drawn * _BASIN >= _COVERAGE * area_m2 * math.tau
 

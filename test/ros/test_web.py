@@ -221,7 +221,7 @@ class Web(FlightCase):
         self.wait(lambda: self.page.goals(1)[0]["state"] == "active", "the first goal again")
 
     def goal_under_way(self):
-        """Whether quad1 is far from its goal, not its last, and the page and its actions know."""
+        """Whether quad1 is over 1.5 m from a goal, not its last; page and actions agree on it."""
         number, goals = self.health.progress(1).goal, self.page.goals(1)
         if self.page.row(1)["goal"] != number or number not in range(1, len(goals)):
             return False

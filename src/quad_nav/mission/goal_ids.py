@@ -15,7 +15,7 @@ from typing import Deque, Hashable, Optional
 
 CLOCK_LAG_S = 0.5
 """The navigator stamps an id when it receives the goal; its clock may lag behind ours."""
-RENAME_S = 5.0
+TAKEN_WITHIN_S = 5.0
 """A navigator takes a goal within this time after it is sent, or after it subscribes."""
 MAX_IDS = 1000
 """Ids that are remembered: a navigator names a goal for a few seconds after its end."""
@@ -54,7 +54,7 @@ class GoalIds:
 
         A navigator that has been restarted gives it another id. Any other subscriber gives none.
         """
-        self._sent_s, self._renames_until_s = now_s, now_s + RENAME_S
+        self._sent_s, self._renames_until_s = now_s, now_s + TAKEN_WITHIN_S
 
     def clear(self) -> None:
         """Register that the active goal has ended."""
@@ -76,7 +76,8 @@ class GoalIds:
             return Owner.EARLIER
         if goal_id in self._other:
             return Owner.OTHER
-        if self._sent_s == math.inf and 0.0 <= stamp_s - self._nameless_s + CLOCK_LAG_S < RENAME_S:
+        since_s = stamp_s - (self._nameless_s - CLOCK_LAG_S)
+        if self._sent_s == math.inf and 0.0 <= since_s < TAKEN_WITHIN_S:  # a stop has overtaken it
             self._nameless_s = math.inf
             self._earlier.append(goal_id)
             return Owner.EARLIER
